@@ -202,7 +202,9 @@ impl Format {
     #[must_use]
     pub const fn filterable(self) -> bool {
         match self.sample_kind() {
-            SampleKind::Float => !matches!(self, Self::R32Float | Self::Rg32Float | Self::Rgba32Float),
+            SampleKind::Float => {
+                !matches!(self, Self::R32Float | Self::Rg32Float | Self::Rgba32Float)
+            }
             SampleKind::Depth => true,
             SampleKind::Sint | SampleKind::Uint => false,
         }
@@ -211,7 +213,10 @@ impl Format {
     /// The format with the given WebGPU name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|format| format.name() == name)
+        Self::ALL
+            .iter()
+            .copied()
+            .find(|format| format.name() == name)
     }
 
     /// The widths of the stored channels in bits, lowest memory first.

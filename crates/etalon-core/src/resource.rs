@@ -32,7 +32,11 @@ impl Extent {
     /// An extent of one layer.
     #[must_use]
     pub const fn d2(width: u32, height: u32) -> Self {
-        Self { width, height, depth_or_layers: 1 }
+        Self {
+            width,
+            height,
+            depth_or_layers: 1,
+        }
     }
 }
 
@@ -54,7 +58,9 @@ pub struct TextureDesc {
 #[non_exhaustive]
 pub enum ResourceError {
     /// An extent, mip count or buffer size is zero.
-    #[error("{what} is zero; every texture has at least one texel and one mip, every buffer at least 4 bytes")]
+    #[error(
+        "{what} is zero; every texture has at least one texel and one mip, every buffer at least 4 bytes"
+    )]
     Empty {
         /// Which of the sizes.
         what: &'static str,
@@ -74,7 +80,9 @@ pub enum ResourceError {
         depth: u32,
     },
     /// A cube whose faces are not square or whose layers are not a multiple of six.
-    #[error("a cube needs square faces and a multiple of six layers, not {width}×{height} with {layers} layers")]
+    #[error(
+        "a cube needs square faces and a multiple of six layers, not {width}×{height} with {layers} layers"
+    )]
     NotACube {
         /// Width of mip 0.
         width: u32,
@@ -99,7 +107,12 @@ impl TextureDesc {
     /// A 2D texture of one mip and one layer.
     #[must_use]
     pub const fn d2(width: u32, height: u32, format: Format) -> Self {
-        Self { dimension: Dimension::D2, extent: Extent::d2(width, height), mips: 1, format }
+        Self {
+            dimension: Dimension::D2,
+            extent: Extent::d2(width, height),
+            mips: 1,
+            format,
+        }
     }
 
     /// A cube map with square faces of `size` texels.
@@ -107,7 +120,11 @@ impl TextureDesc {
     pub const fn cube(size: u32, format: Format) -> Self {
         Self {
             dimension: Dimension::Cube,
-            extent: Extent { width: size, height: size, depth_or_layers: 6 },
+            extent: Extent {
+                width: size,
+                height: size,
+                depth_or_layers: 6,
+            },
             mips: 1,
             format,
         }
@@ -118,7 +135,11 @@ impl TextureDesc {
     pub const fn d3(width: u32, height: u32, depth: u32, format: Format) -> Self {
         Self {
             dimension: Dimension::D3,
-            extent: Extent { width, height, depth_or_layers: depth },
+            extent: Extent {
+                width,
+                height,
+                depth_or_layers: depth,
+            },
             mips: 1,
             format,
         }
@@ -179,11 +200,19 @@ impl TextureDesc {
     /// The mip count of a full chain.
     #[must_use]
     pub const fn max_mips(&self) -> u32 {
-        let mut size = if self.extent.width > self.extent.height { self.extent.width } else { self.extent.height };
+        let mut size = if self.extent.width > self.extent.height {
+            self.extent.width
+        } else {
+            self.extent.height
+        };
         if matches!(self.dimension, Dimension::D3) && self.extent.depth_or_layers > size {
             size = self.extent.depth_or_layers;
         }
-        if size == 0 { 1 } else { 32 - size.leading_zeros() }
+        if size == 0 {
+            1
+        } else {
+            32 - size.leading_zeros()
+        }
     }
 
     /// Bytes of one mip level of all layers, tightly packed; `None` if that overflows.
@@ -207,8 +236,17 @@ impl TextureDesc {
     /// # Errors
     /// The first rule it breaks.
     pub fn validate(&self, limits: &Limits) -> Result<(), ResourceError> {
-        let Extent { width, height, depth_or_layers } = self.extent;
-        for (what, size) in [("width", width), ("height", height), ("depth or layer count", depth_or_layers), ("mip count", self.mips)] {
+        let Extent {
+            width,
+            height,
+            depth_or_layers,
+        } = self.extent;
+        for (what, size) in [
+            ("width", width),
+            ("height", height),
+            ("depth or layer count", depth_or_layers),
+            ("mip count", self.mips),
+        ] {
             if size == 0 {
                 return Err(ResourceError::Empty { what });
             }
@@ -217,22 +255,48 @@ impl TextureDesc {
             Dimension::D2 | Dimension::Cube => (limits.max_texture_2d, limits.max_texture_layers),
             Dimension::D3 => (limits.max_texture_3d, limits.max_texture_3d),
         };
-        for (what, size, limit) in [("texture width", width, flat), ("texture height", height, flat), ("texture depth or layers", depth_or_layers, deep)] {
+        for (what, size, limit) in [
+            ("texture width", width, flat),
+            ("texture height", height, flat),
+            ("texture depth or layers", depth_or_layers, deep),
+        ] {
             if size > limit {
-                return Err(ResourceError::OverLimit { what, size: size.into(), limit: limit.into() });
+                return Err(ResourceError::OverLimit {
+                    what,
+                    size: size.into(),
+                    limit: limit.into(),
+                });
             }
         }
         if self.dimension == Dimension::Cube && (width != height || depth_or_layers % 6 != 0) {
-            return Err(ResourceError::NotACube { width, height, layers: depth_or_layers });
+            return Err(ResourceError::NotACube {
+                width,
+                height,
+                layers: depth_or_layers,
+            });
         }
         let max = self.max_mips();
         if self.mips > max {
-            let depth = if self.dimension == Dimension::D3 { depth_or_layers } else { 1 };
-            return Err(ResourceError::TooManyMips { mips: self.mips, max, width, height, depth });
+            let depth = if self.dimension == Dimension::D3 {
+                depth_or_layers
+            } else {
+                1
+            };
+            return Err(ResourceError::TooManyMips {
+                mips: self.mips,
+                max,
+                width,
+                height,
+                depth,
+            });
         }
         let size = self.bytes().unwrap_or(u64::MAX);
         if size > limits.max_texture_bytes {
-            return Err(ResourceError::OverLimit { what: "texture size in bytes", size, limit: limits.max_texture_bytes });
+            return Err(ResourceError::OverLimit {
+                what: "texture size in bytes",
+                size,
+                limit: limits.max_texture_bytes,
+            });
         }
         Ok(())
     }
@@ -252,7 +316,9 @@ impl BufferDesc {
     /// If it is zero or over the limit.
     pub fn validate(&self, limits: &Limits) -> Result<(), ResourceError> {
         if self.bytes < 4 {
-            return Err(ResourceError::Empty { what: "buffer size" });
+            return Err(ResourceError::Empty {
+                what: "buffer size",
+            });
         }
         if self.bytes > limits.max_buffer_bytes {
             return Err(ResourceError::OverLimit {
@@ -300,8 +366,11 @@ pub struct SamplerDesc {
 
 impl SamplerDesc {
     /// Linear within and between mips, clamped to the edge.
-    pub const LINEAR_CLAMP: Self =
-        Self { address: AddressMode::ClampToEdge, filter: Filter::Linear, mip_filter: Filter::Linear };
+    pub const LINEAR_CLAMP: Self = Self {
+        address: AddressMode::ClampToEdge,
+        filter: Filter::Linear,
+        mip_filter: Filter::Linear,
+    };
 }
 
 /// What a device can do, as far as planning must know.
@@ -325,6 +394,9 @@ pub struct Limits {
     pub max_workgroup_bytes: u32,
     /// Alignment of uniform blocks within a buffer, a power of two.
     pub uniform_alignment: u32,
+    /// Whether formats of [`StorageSupport::Extended`](crate::format::StorageSupport)
+    /// may be written by kernels.
+    pub extended_storage_formats: bool,
 }
 
 impl Default for Limits {
@@ -340,6 +412,7 @@ impl Default for Limits {
             max_workgroup_invocations: 256,
             max_workgroup_bytes: 16_384,
             uniform_alignment: 256,
+            extended_storage_formats: false,
         }
     }
 }

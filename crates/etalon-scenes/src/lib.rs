@@ -1,1 +1,19 @@
-//! .
+//! Scenes, frames and exact reference answers.
+//!
+//! * [`camera`]: the camera and the one projection every frame uses.
+//! * [`frame`]: what a rendered frame hands to the effects.
+//! * [`trace`](mod@trace): an exact f64 ray caster, and the true reflections in a scene.
+//! * [`scenes`]: a registry of procedural scenes.
+//! * [`picture`]: images as PNG files to look at.
+
+#![forbid(unsafe_code)]
+
+pub mod camera;
+pub mod frame;
+pub mod picture;
+pub mod scenes;
+pub mod trace;
+
+pub use camera::{Camera, Pose, Projection};
+pub use frame::{Frame, FrameCamera, FrameSize};
+pub use scenes::{SceneEntry, World, scene, scenes};

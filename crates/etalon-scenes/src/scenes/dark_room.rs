@@ -1,0 +1,57 @@
+//! A nearly black room with tiny, very bright lamps.
+//!
+//! For bloom, exposure and everything that averages: six orders of magnitude
+//! between neighbouring pixels, lamps of less than a pixel, and radiance close
+//! to the largest half float.
+
+use glam::DVec3;
+
+use super::{World, WorldError, moving_camera};
+use crate::trace::{Ambient, Material, SceneBuilder, Shape};
+
+pub(super) fn build() -> Result<World, WorldError> {
+    let mut scene = SceneBuilder::new();
+    scene.ambient(Ambient { above: DVec3::splat(2e-4), below: DVec3::splat(2e-4) });
+    // A room is the inside of a box.
+    scene.object(
+        Shape::aligned_box(DVec3::new(0.0, 2.0, 0.0), DVec3::new(5.0, 2.0, 6.0)),
+        Material::matte(DVec3::new(0.05, 0.045, 0.04)),
+    );
+    scene.object(
+        Shape::Disc { center: DVec3::new(0.0, 0.001, -1.0), normal: DVec3::Y, radius: 2.4 },
+        Material { roughness: 0.08.into(), ..Material::plastic(DVec3::splat(0.02), 0.08) },
+    );
+    let (table, leg) = (DVec3::new(0.10, 0.06, 0.03), 0.04);
+    scene.object(
+        Shape::aligned_box(DVec3::new(0.0, 0.78, -1.0), DVec3::new(1.2, 0.03, 0.6)),
+        Material::plastic(table, 0.3),
+    );
+    for (x, z) in [(-1.1, -1.5), (1.1, -1.5), (-1.1, -0.5), (1.1, -0.5)] {
+        scene.object(
+            Shape::aligned_box(DVec3::new(x, 0.375, z), DVec3::new(leg, 0.375, leg)),
+            Material::plastic(table, 0.5),
+        );
+    }
+    scene.object(
+        Shape::Sphere { center: DVec3::new(0.55, 0.99, -1.05), radius: 0.18 },
+        Material::plastic(DVec3::new(0.3, 0.02, 0.02), 0.1),
+    );
+    // From one end of what a half float can hold to the other.
+    for (position, radius, radiance) in [
+        ([-0.5, 1.05, -1.0], 0.006, DVec3::new(60_000.0, 52_000.0, 40_000.0)),
+        ([-2.4, 2.3, -4.6], 0.012, DVec3::new(9_000.0, 14_000.0, 30_000.0)),
+        ([2.7, 1.5, -5.0], 0.020, DVec3::new(2_400.0, 600.0, 90.0)),
+        ([3.4, 3.2, -2.0], 0.030, DVec3::new(12.0, 90.0, 24.0)),
+        ([-3.6, 0.7, -2.5], 0.045, DVec3::new(6.0, 0.4, 9.0)),
+        ([0.9, 0.86, -0.7], 0.004, DVec3::new(0.0, 0.0, 60_000.0)),
+        ([1.6, 2.9, -5.9], 0.008, DVec3::new(60_000.0, 0.0, 0.0)),
+    ] {
+        scene.lamp(DVec3::from_array(position), radius, radiance);
+    }
+    let camera = moving_camera(
+        [DVec3::new(-0.4, 1.6, 4.2), DVec3::new(0.0, 1.25, -2.0)],
+        [DVec3::new(-0.3, 1.6, 4.2), DVec3::new(0.0, 1.25, -2.0)],
+        55.0,
+    )?;
+    Ok(World { scene: scene.build()?, camera })
+}

@@ -1,0 +1,24 @@
+//! An exact ray caster in f64: the truth that screen-space effects are measured
+//! against.
+//!
+//! [`trace`] renders what an engine's geometry pass would hand to the effects;
+//! [`true_reflection`] answers, for each of its pixels, what a perfect mirror
+//! ray really meets and whether the screen could have known.
+
+mod bvh;
+mod material;
+mod primitive;
+mod ray;
+mod reflect;
+mod render;
+mod scene;
+mod shade;
+mod shape;
+
+pub(crate) use material::hash;
+pub use material::{Material, Pattern, Property};
+pub use ray::{Hit, Ray, SurfaceId};
+pub use reflect::{MirrorHit, MirrorRay, Reflection, true_reflection};
+pub use render::trace;
+pub use scene::{Ambient, Light, Object, Scene, SceneBuilder, SceneError, Sky};
+pub use shape::{Mesh, Shape};

@@ -3,3 +3,5 @@
 #![forbid(unsafe_code)]
 
 pub mod compare;
+pub mod drivers;
+pub mod setup;

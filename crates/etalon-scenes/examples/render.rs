@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Without arguments it lists the scenes. Besides the frame's own images it
-//! writes `mirror.png`: each pixel's true mirror reflection, and `reachable.png`:
+//! writes `mirror.png`: each pixel's true mirror reflection, `combined.png`: the
+//! frame with those added by specular colour and shininess, and `reachable.png`:
 //! green where the camera sees what is reflected, red where it does not, blue
 //! where the reflection is of the sky.
 
@@ -48,6 +49,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     write_png(&frame.velocity, Look::Velocity { scale: 0.02 }, &folder.join("velocity.png"))?;
 
     let reflection = (entry.build)()?.reflection(size)?;
+    let colour = frame.colour.to_rgba_f32()?;
+    let specular = frame.specular.to_rgba_f32()?;
+    let combined: Vec<_> = (colour.iter().zip(&specular).zip(&reflection.rays))
+        .map(|((colour, specular), ray)| {
+            let mirrored = mirrored(ray);
+            std::array::from_fn(|i| colour[i] + mirrored[i] * specular[i] * specular[3] * specular[3])
+        })
+        .collect();
+    let desc = TextureDesc::d2(size.width(), size.height(), Format::Rgba32Float);
+    let combined = ImageData::from_rgba_f32(desc, &combined)?;
+    write_png(&combined, Look::Colour { exposure }, &folder.join("combined.png"))?;
     let image = |texel: fn(&MirrorRay) -> [f32; 4]| picture(&reflection, texel);
     write_png(&image(mirrored)?, Look::Colour { exposure }, &folder.join("mirror.png"))?;
     write_png(&image(reachable)?, Look::Plain, &folder.join("reachable.png"))?;

@@ -26,7 +26,7 @@ pub(super) fn build() -> Result<World, WorldError> {
         },
         Material {
             base: Property::Varying { low: DVec3::splat(0.05), high: DVec3::new(0.20, 0.18, 0.16), pattern: floor },
-            specular: DVec3::splat(0.06).into(),
+            specular: DVec3::splat(0.30).into(),
             roughness: 0.06.into(),
             emission: DVec3::ZERO,
         },

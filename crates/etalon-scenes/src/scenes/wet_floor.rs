@@ -17,12 +17,18 @@ const AMBER: DVec3 = DVec3::new(1.0, 0.55, 0.16);
 
 pub(super) fn build() -> Result<World, WorldError> {
     let mut scene = SceneBuilder::new();
-    scene.sky(Sky { horizon: DVec3::new(0.055, 0.060, 0.11), zenith: DVec3::new(0.006, 0.008, 0.022) });
-    scene.ambient(Ambient { above: DVec3::new(0.030, 0.036, 0.065), below: DVec3::splat(0.012) });
+    scene.sky(Sky { horizon: DVec3::new(0.035, 0.040, 0.085), zenith: DVec3::new(0.002, 0.004, 0.016) });
+    scene.ambient(Ambient { above: DVec3::new(0.034, 0.042, 0.080), below: DVec3::new(0.016, 0.014, 0.014) });
     // The moon, from behind the camera's left shoulder.
     scene.light(Light::Directional {
         towards: DVec3::new(-0.55, 0.75, 0.62),
-        irradiance: DVec3::new(0.55, 0.66, 0.95),
+        irradiance: DVec3::new(0.34, 0.44, 0.72),
+    });
+    // A street lamp out of the picture, to the right of the camera.
+    scene.light(Light::Point {
+        position: DVec3::new(4.6, 5.2, 5.6),
+        intensity: DVec3::new(1.0, 0.80, 0.58) * 62.0,
+        body: 0.0,
     });
     ground(&mut scene);
     walls(&mut scene);
@@ -39,11 +45,11 @@ pub(super) fn build() -> Result<World, WorldError> {
 /// Flagstones, dark and wet in patches.
 fn ground(scene: &mut SceneBuilder) {
     let puddles = Pattern::Patches {
-        u: DVec3::X * 2.3,
-        v: DVec3::Z * 2.9,
-        low: 0.40,
-        high: 0.60,
-        seed: 11,
+        u: DVec3::new(2.2, 0.0, 0.9),
+        v: DVec3::new(-0.8, 0.0, 1.7),
+        low: 0.44,
+        high: 0.52,
+        seed: 9,
     };
     let stones = Pattern::Grid { origin: DVec3::new(0.3, 0.0, 0.2), u: DVec3::X * 1.1, v: DVec3::Z * 1.1, line: 0.022 };
     scene.object(
@@ -69,7 +75,7 @@ fn walls(scene: &mut SceneBuilder) {
         line: 0.045,
     };
     scene.object(
-        Shape::aligned_box(DVec3::new(0.0, 1.7, -5.25), DVec3::new(7.5, 1.7, 0.25)),
+        Shape::aligned_box(DVec3::new(0.0, 2.1, -5.25), DVec3::new(12.0, 2.1, 0.25)),
         Material {
             base: Property::Varying {
                 low: DVec3::new(0.33, 0.24, 0.20),
@@ -81,7 +87,7 @@ fn walls(scene: &mut SceneBuilder) {
     );
     // A capping of lighter stone.
     scene.object(
-        Shape::aligned_box(DVec3::new(0.0, 3.47, -5.2), DVec3::new(7.6, 0.07, 0.38)),
+        Shape::aligned_box(DVec3::new(0.0, 4.27, -5.2), DVec3::new(12.0, 0.07, 0.38)),
         Material::matte(DVec3::splat(0.42)),
     );
     // A side wall with slanted stripes, turned towards the camera.
@@ -126,7 +132,7 @@ fn solids(scene: &mut SceneBuilder) {
     // A low plinth with the knot on it.
     scene.object(block(2.75, -2.45, [0.85, 0.16, 0.85], 0.2), plastic(0.36, 0.34, 0.33, 0.5));
     scene.object(
-        Shape::Mesh(Mesh::knot(DVec3::new(2.75, 1.36, -2.45), 0.62, 0.17, 192, 20)),
+        Shape::Mesh(Mesh::knot(DVec3::new(2.75, 1.36, -2.45), 0.62, 0.17, 384, 32)),
         Material {
             base: DVec3::new(0.48, 0.26, 0.07).into(),
             ..Material::metal(DVec3::new(0.90, 0.62, 0.28), 0.28)
@@ -134,7 +140,7 @@ fn solids(scene: &mut SceneBuilder) {
     );
     // A gem afloat over the tall block, so that its reflection is far from it.
     scene.object(
-        Shape::Mesh(Mesh::icosahedron(DVec3::new(-2.45, 2.42, -1.15), 0.42)),
+        Shape::Mesh(Mesh::icosahedron(DVec3::new(-2.45, 2.46, -1.15), 0.50)),
         Material { base: DVec3::new(0.22, 0.62, 0.52).into(), ..plastic(0.0, 0.0, 0.0, 0.15) },
     );
     // Sticks: thin things that coarse depth tests miss.
@@ -160,15 +166,15 @@ fn neon(scene: &mut SceneBuilder) {
             scene.light(Light::Point { position, intensity: colour * (power / f64::from(lights)), body: 0.0 });
         }
     };
-    let out = DVec3::new(0.0, 0.0, 0.35);
-    tube(DVec3::new(-1.6, 2.62, -4.94), DVec3::new(1.9, 0.035, 0.035), CYAN, 9.0, 3, out, 7.0);
-    tube(DVec3::new(-1.6, 2.36, -4.94), DVec3::new(1.9, 0.035, 0.035), MAGENTA, 9.0, 3, out, 6.0);
+    let out = DVec3::new(0.0, 0.0, 0.45);
+    tube(DVec3::new(-2.1, 3.62, -4.94), DVec3::new(2.6, 0.04, 0.04), CYAN, 7.0, 4, out, 15.0);
+    tube(DVec3::new(-2.1, 3.30, -4.94), DVec3::new(2.6, 0.04, 0.04), MAGENTA, 7.0, 4, out, 13.0);
     for i in 0..3 {
-        let x = 2.15 + 0.42 * f64::from(i);
-        let half = DVec3::new(0.035, 0.85 - 0.18 * f64::from(i), 0.035);
-        tube(DVec3::new(x, 1.9, -4.94), half, AMBER, 10.0, 1, out, 2.6);
+        let x = 1.75 + 0.45 * f64::from(i);
+        let half = DVec3::new(0.04, 1.05 - 0.22 * f64::from(i), 0.04);
+        tube(DVec3::new(x, 2.65, -4.94), half, AMBER, 8.0, 1, out, 5.0);
     }
     // A lantern in front of the columns, and one behind the tall block.
     scene.lamp(DVec3::new(3.72, 1.05, 1.9), 0.09, AMBER * 130.0);
-    scene.lamp(DVec3::new(-0.85, 0.42, -3.6), 0.10, CYAN * 90.0);
+    scene.lamp(DVec3::new(-4.4, 0.55, -3.4), 0.11, CYAN * 70.0);
 }

@@ -418,7 +418,8 @@ impl<'g> ComputePass<'g> {
         self
     }
 
-    /// Binds a sampler.
+    /// Binds a sampler. Strict kernels filter by themselves: where one has no
+    /// such sampler, it is left out.
     pub fn sampler(mut self, binding: impl Into<Cow<'static, str>>, sampler: SamplerDesc) -> Self {
         self.samplers.push((binding.into(), sampler));
         self

@@ -350,8 +350,12 @@ impl Binder<'_> {
         }
         let is_sampler: fn(&BindingKind) -> bool =
             |kind| matches!(kind, BindingKind::Sampler { .. });
+        // Strict kernels filter by themselves, so the sampler that the fast
+        // variant of the same kernel needs has nothing to be bound to there.
+        let strict = self.options.arithmetic == kernel::Arithmetic::Strict;
         for (name, _) in samplers {
-            if !named(name).is_some_and(is_sampler) {
+            let binding = named(name);
+            if !binding.is_some_and(is_sampler) && !(strict && binding.is_none()) {
                 return Err(self.not_in_kernel("sampler", name, of(is_sampler)));
             }
         }

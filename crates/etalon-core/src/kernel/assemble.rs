@@ -232,6 +232,7 @@ impl From<wesl::Error> for Failure {
         };
         match error {
             wesl::Error::ParseError(parse) => {
+                failure.message = shorten(parse.error.to_string());
                 failure.kind = FailureKind::Syntax;
                 failure.span = Some(parse.span);
             }
@@ -388,7 +389,10 @@ impl Resolver for Modules<'_> {
             ResolveError::Error(diagnostic)
         };
         if text.len() > MAX_FILE_BYTES {
-            let message = format!("the file has {} bytes, over the limit of {MAX_FILE_BYTES}", text.len());
+            let message = format!(
+                "the file has {} bytes, over the limit of {MAX_FILE_BYTES}",
+                text.len()
+            );
             return Err(refuse(0, message));
         }
         scan::check_nesting(&text).map_err(|offset| {

@@ -49,7 +49,7 @@ pub(super) fn write_excerpt(
 }
 
 /// Why a kernel could not be compiled.
-#[derive(Clone, Debug, Error)]
+#[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum KernelError {
     /// No kernel has the path asked for.
@@ -71,7 +71,10 @@ pub enum KernelError {
     Condition(Diagnostic),
     /// The request sets a feature that no `@if` of the kernel or of what it
     /// imports mentions.
-    #[error("kernel `{kernel}` has no feature `{name}`; {}", exists("it has", known))]
+    #[error(
+        "kernel `{kernel}` has no feature `{name}`; {}",
+        exists("it has", known)
+    )]
     UnknownFeature {
         /// Path of the kernel.
         kernel: String,
@@ -81,7 +84,10 @@ pub enum KernelError {
         known: Vec<String>,
     },
     /// The request sets a constant that the kernel does not declare.
-    #[error("kernel `{kernel}` has no override `{name}`; {}", exists("it has", known))]
+    #[error(
+        "kernel `{kernel}` has no override `{name}`; {}",
+        exists("it has", known)
+    )]
     UnknownConstant {
         /// Path of the kernel.
         kernel: String,
@@ -141,6 +147,14 @@ pub enum KernelError {
         /// Every such operation.
         findings: Vec<Finding>,
     },
+    /// A kernel has no translation to SPIR-V.
+    #[error("kernel `{kernel}` cannot become SPIR-V: {message}")]
+    Spirv {
+        /// Path of the kernel.
+        kernel: String,
+        /// What stands in the way.
+        message: String,
+    },
     /// A compiler this one builds on failed where it should not have.
     #[error("kernel `{kernel}`: internal error while {stage}: {message}")]
     Internal {
@@ -171,6 +185,7 @@ impl KernelError {
             | Self::UnknownFeature { .. }
             | Self::UnknownConstant { .. }
             | Self::EntryPoint { .. }
+            | Self::Spirv { .. }
             | Self::Internal { .. } => None,
         }
     }

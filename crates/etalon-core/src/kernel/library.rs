@@ -10,7 +10,7 @@ use super::{Arithmetic, Kernel, KernelError, KernelRequest};
 
 /// The text of a file.
 #[derive(Clone, Debug)]
-pub(super) enum Text {
+pub(crate) enum Text {
     Embedded(&'static str),
     Added(Arc<str>),
 }

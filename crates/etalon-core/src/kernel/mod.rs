@@ -59,7 +59,9 @@ pub use source_map::{GENERATED, SourceLocation, SourceMap};
 pub use spirv::{NO_CONTRACTION_OPCODES, SpirvOptions, spirv};
 
 /// Which operations kernels compute with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
 pub enum Arithmetic {
     /// Operations with one correct result: every executor gives the same bits.
     #[default]

@@ -59,7 +59,9 @@ impl<'a> Tokens<'a> {
             self.offset += rest.len() - trimmed.len();
             if trimmed.starts_with("//") {
                 self.offset += trimmed
-                    .find(['\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}'])
+                    .find([
+                        '\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}',
+                    ])
                     .unwrap_or(trimmed.len());
             } else if trimmed.starts_with("/*") {
                 self.offset += block_comment_len(trimmed);
@@ -240,7 +242,7 @@ pub(crate) fn check_nesting(text: &str) -> Result<(), usize> {
     // for each open bracket.
     let mut open: Vec<usize> = vec![0];
     let mut total = 0_usize;
-    let mut reset = |open: &mut Vec<usize>, total: &mut usize| {
+    let reset = |open: &mut Vec<usize>, total: &mut usize| {
         if let Some(level) = open.last_mut() {
             *total -= *level;
             *level = 0;

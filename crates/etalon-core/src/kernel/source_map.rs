@@ -12,11 +12,11 @@
 use std::fmt;
 use std::ops::Range;
 
-
 use serde::{Deserialize, Serialize};
 use wesl::syntax::TranslationUnit;
 
 use super::error::Diagnostic;
+use super::library::Text;
 use super::syntax::{self, Node};
 
 /// The file name of places that only exist in generated text.
@@ -49,7 +49,7 @@ pub(crate) struct SourceFile {
 }
 
 impl SourceFile {
-    pub(crate) fn new(name: String, text: Arc<str>) -> Self {
+    pub(crate) fn new(name: String, text: Text) -> Self {
         let lines = std::iter::once(0)
             .chain(text.match_indices('\n').map(|(at, _)| at + 1))
             .collect();
@@ -173,10 +173,10 @@ pub struct SourceMap {
 impl SourceMap {
     /// Lays `assembled`, whose spans are global offsets in `files`, beside the
     /// text printed from it.
-    pub(crate) fn new(files: SourceFiles, assembled: &TranslationUnit, printed: Arc<str>) -> Self {
+    pub(crate) fn new(files: SourceFiles, assembled: &TranslationUnit, printed: &str) -> Self {
         let mut map = Self {
             files,
-            generated: SourceFile::new(GENERATED.to_owned(), printed),
+            generated: SourceFile::new(GENERATED.to_owned(), Text::Added(printed.into())),
             mappings: Vec::new(),
         };
         let Ok(reparsed) = map.generated.text.parse::<TranslationUnit>() else {

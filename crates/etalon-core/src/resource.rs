@@ -6,6 +6,13 @@ use thiserror::Error;
 
 use crate::Format;
 
+/// The most layers a texture may have, whatever the device says: no device
+/// offers more, and planning follows every layer of every mip.
+pub const MAX_LAYERS: u32 = 4096;
+
+/// The most mips a texture can have: sizes are 32-bit numbers.
+pub const MAX_MIPS: u32 = 32;
+
 /// The shape of a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum Dimension {
@@ -252,7 +259,10 @@ impl TextureDesc {
             }
         }
         let (flat, deep) = match self.dimension {
-            Dimension::D2 | Dimension::Cube => (limits.max_texture_2d, limits.max_texture_layers),
+            Dimension::D2 | Dimension::Cube => (
+                limits.max_texture_2d,
+                limits.max_texture_layers.min(MAX_LAYERS),
+            ),
             Dimension::D3 => (limits.max_texture_3d, limits.max_texture_3d),
         };
         for (what, size, limit) in [

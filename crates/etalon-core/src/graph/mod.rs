@@ -13,9 +13,9 @@
 //!     graph
 //!         .compute("example/darken")
 //!         .read("source", source)
-//!         .write("target", target)
+//!         .write("result", target)
 //!         .set("amount", amount)
-//!         .per_texel("target")
+//!         .per_texel("result")
 //! }
 //! ```
 //!
@@ -50,7 +50,7 @@ pub use pass::{ComputePass, Written};
 pub use uniform::UniformValue;
 
 use crate::format::SampleKind;
-use crate::resource::{BufferDesc, TextureDesc};
+use crate::resource::{BufferDesc, MAX_LAYERS, MAX_MIPS, TextureDesc};
 
 /// A texture's or a buffer's description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -63,9 +63,15 @@ pub enum ResourceDesc {
 
 impl ResourceDesc {
     /// Mips and layers, each 1 for a buffer.
+    ///
+    /// Counts that no texture can have are cut to the most one can: planning
+    /// refuses such a texture, and until then it must not cost memory.
     pub(crate) fn subresources(&self) -> (u32, u32) {
         match self {
-            Self::Texture(desc) => (desc.mips.max(1), desc.layers().max(1)),
+            Self::Texture(desc) => (
+                desc.mips.clamp(1, MAX_MIPS),
+                desc.layers().clamp(1, MAX_LAYERS),
+            ),
             Self::Buffer(_) => (1, 1),
         }
     }
@@ -228,9 +234,7 @@ impl Graph {
     fn add(&mut self, name: String, desc: ResourceDesc, origin: Origin) -> u32 {
         let name = unique(&mut self.resource_names, name);
         let (mips, layers) = desc.subresources();
-        // A count that is too large is refused by planning, which knows the
-        // limits; until then it must not cost memory.
-        let count = (u64::from(mips) * u64::from(layers)).min(1 << 16) as usize;
+        let count = (mips * layers) as usize;
         let index = self.resources.len() as u32;
         self.resources.push(Resource {
             name,

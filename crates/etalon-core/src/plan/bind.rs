@@ -344,18 +344,15 @@ impl Binder<'_> {
             .iter()
             .filter(|access| access.kind != AccessKind::Indirect)
         {
-            if !named(&access.binding).is_some_and(is_resource) {
+            let unused = !access.kind.writes() && self.unused(&access.binding);
+            if !named(&access.binding).is_some_and(is_resource) && !unused {
                 return Err(self.not_in_kernel("resource", &access.binding, of(is_resource)));
             }
         }
         let is_sampler: fn(&BindingKind) -> bool =
             |kind| matches!(kind, BindingKind::Sampler { .. });
-        // Strict kernels filter by themselves, so the sampler that the fast
-        // variant of the same kernel needs has nothing to be bound to there.
-        let strict = self.options.arithmetic == kernel::Arithmetic::Strict;
         for (name, _) in samplers {
-            let binding = named(name);
-            if !binding.is_some_and(is_sampler) && !(strict && binding.is_none()) {
+            if !named(name).is_some_and(is_sampler) && !self.unused(name) {
                 return Err(self.not_in_kernel("sampler", name, of(is_sampler)));
             }
         }
@@ -365,6 +362,12 @@ impl Binder<'_> {
             }
             _ => Ok(()),
         }
+    }
+
+    /// Whether the kernel's file declares a resource that this variant of it
+    /// does without: a strict kernel filters by itself and wants no sampler.
+    fn unused(&self, name: &str) -> bool {
+        self.kernel.unused.iter().any(|unused| unused == name)
     }
 
     /// Packs the uniform block; its place in the plan's bytes is returned.

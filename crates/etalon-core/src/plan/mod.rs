@@ -319,8 +319,14 @@ pub struct PlannedHistory {
 }
 
 /// A kernel as a plan refers to it: compared, hashed and printed by identity.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct KernelRef(pub Arc<Kernel>);
+
+impl std::fmt::Debug for KernelRef {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0.name)
+    }
+}
 
 impl PartialEq for KernelRef {
     fn eq(&self, other: &Self) -> bool {

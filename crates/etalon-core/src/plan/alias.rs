@@ -83,7 +83,10 @@ pub(crate) fn place(ordered: Ordered, memory: &dyn MemoryModel) -> Result<Placed
             let resource = &resources[ended as usize];
             if let ResourceKind::Transient(place) = &resource.kind {
                 let heap = heap_of(&resource.desc, &mut textures, &mut buffers);
-                heap.free(place.offset, place.bytes, resource.usages);
+                // A barrier on one tenant says nothing of the tenants
+                // before, so their uses stay with the block.
+                let tenants = resource.usages.union(tenants_before[ended as usize]);
+                heap.free(place.offset, place.bytes, tenants);
                 slots.free(resource.desc, place.slot);
             }
         }

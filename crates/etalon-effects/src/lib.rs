@@ -1,1 +1,43 @@
-//! .
+//! The effects of Etalon.
+//!
+//! An effect is a function: it takes a [`Graph`](etalon_core::graph::Graph),
+//! handles to what it reads and its settings, declares its passes, and returns
+//! handles to what they write. It knows no device; whoever executes the planned
+//! graph decides where it runs.
+//!
+//! | Effect | What it does | Kernels |
+//! |---|---|---|
+//! | [`ssr`](mod@ssr) | screen-space reflection | `shaders/ssr` |
+//! | [`exposure`](mod@exposure) | average luminance and adaptation | `shaders/exposure` |
+//! | [`bloom`](mod@bloom) | glow of bright light | `shaders/bloom` |
+//! | [`composite`](mod@composite) | tone curve and encoding | `shaders/composite` |
+//!
+//! [`chain`](mod@chain) runs those that a frame asks for; [`registry`] knows
+//! all of them by name.
+//!
+//! # Settings
+//! Settings are plain structs. Each field says what it does to the picture, its
+//! range, and its cost. A value outside of its range, NaN included, is a
+//! [`SettingError`]; none is clamped in silence.
+//!
+//! # Any input
+//! Kernels make imported values finite where they first read them, so a NaN in
+//! one texel costs that texel and not the picture. Every effect gives finite
+//! results for every bit pattern of its inputs.
+
+#![forbid(unsafe_code)]
+
+pub mod bloom;
+pub mod chain;
+mod check;
+pub mod composite;
+mod error;
+pub mod exposure;
+pub mod registry;
+mod scene;
+pub mod ssr;
+
+pub use chain::{Chain, ChainSettings, chain};
+pub use error::{EffectError, SettingError};
+pub use registry::{EffectEntry, effect, effects};
+pub use scene::{CameraParams, DepthRange, SceneInputs};

@@ -4,11 +4,13 @@
 //! * [`frame`]: what a rendered frame hands to the effects.
 //! * [`trace`](mod@trace): an exact f64 ray caster, and the true reflections in a scene.
 //! * [`scenes`]: a registry of procedural scenes.
+//! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
 
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod exr_frame;
 pub mod frame;
 pub mod picture;
 pub mod scenes;

@@ -32,6 +32,8 @@ pub(super) struct Part {
     /// Empty if it has none.
     pub(super) name: String,
     pub(super) view: Option<String>,
+    /// Views kept apart by channel names, the default one first.
+    pub(super) views: Vec<String>,
     /// In the order of the file.
     pub(super) channels: Vec<String>,
 }
@@ -83,6 +85,7 @@ pub(super) fn read_header(bytes: &[u8], max_bytes: u64) -> Result<File, ExrError
             .map(|header| Part {
                 name: header.own_attributes.layer_name.as_ref().map(text).unwrap_or_default(),
                 view: header.own_attributes.view_name.as_ref().map(text),
+                views: (header.own_attributes.multi_view_names.iter().flatten()).map(text).collect(),
                 channels: header.channels.list.iter().map(|channel| text(&channel.name)).collect(),
             })
             .collect(),
@@ -213,7 +216,11 @@ fn decompress(chunk: Chunk, meta: &MetaData) -> Result<Option<UncompressedBlock>
         _ => return Err(ExrError::Unsupported(format!("part {part} is deep"))),
     };
     if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
-        check_dwa(data, header.max_block_byte_size())?;
+        let area = guarded(|| {
+            let coordinates = header.get_block_data_indices(&chunk.compressed_block)?;
+            Ok(header.get_absolute_block_pixel_coordinates(coordinates)?.size.area())
+        })?;
+        check_dwa(data, area.saturating_mul(header.channels.bytes_per_pixel))?;
     }
     let block = guarded(|| UncompressedBlock::decompress_chunk(chunk, meta, false))?;
     let expected = block.index.pixel_size.area().saturating_mul(header.channels.bytes_per_pixel);
@@ -230,14 +237,13 @@ fn decompress(chunk: Chunk, meta: &MetaData) -> Result<Option<UncompressedBlock>
 /// allocates by: none can be much over the uncompressed size. (Coefficients are
 /// in whole blocks of 8 × 8, run lengths at worst double the size.)
 fn check_dwa(data: &[u8], block: usize) -> Result<(), ExrError> {
-    let limit = (block as u64).saturating_mul(4).saturating_add(1 << 16);
-    let counts = data.as_chunks::<8>().0.iter().take(10).skip(1).map(|bytes| u64::from_le_bytes(*bytes));
-    // Stored raw, a block has no such counts and is as long as its pixels are;
-    // those may look like anything, so they must not be judged.
-    if data.len() < 88 || data.len() == block {
+    // Stored raw, a block is as long as its pixels are and has no such counts.
+    if data.len() == block {
         return Ok(());
     }
-    match counts.max() {
+    let limit = (block as u64).saturating_mul(4).saturating_add(1 << 16);
+    let counts = data.as_chunks::<8>().0.iter().take(10).skip(1);
+    match counts.map(|bytes| u64::from_le_bytes(*bytes)).max() {
         Some(count) if count > limit => {
             Err(ExrError::Malformed(format!("a block of {block} bytes claims to hold {count}")))
         }

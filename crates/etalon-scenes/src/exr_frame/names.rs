@@ -173,7 +173,8 @@ struct Catalogue {
 
 impl Catalogue {
     fn new(file: &File) -> Self {
-        let mut views: Vec<String> = file.parts.iter().filter_map(|part| part.view.clone()).collect();
+        let mut views: Vec<String> =
+            file.parts.iter().flat_map(|part| part.view.iter().chain(&part.views).cloned()).collect();
         views.sort();
         views.dedup();
         let mut entries = Vec::new();
@@ -184,10 +185,14 @@ impl Catalogue {
                     .filter(|word| !word.is_empty() && !views.iter().any(|view| view == word))
                     .map(str::to_lowercase)
                     .collect();
+                // A part of several views names them among the layers; the
+                // first is that of all other channels.
+                let named = prefix.split('.').find(|word| part.views.iter().any(|view| view == word));
+                let default = || part.view.clone().or_else(|| part.views.first().cloned());
                 entries.push(Entry {
                     place: Place { part: index, channel },
                     name: ChannelName::new(part.name.clone(), name.clone()),
-                    view: part.view.clone(),
+                    view: named.map(str::to_owned).or_else(default),
                     layer,
                     group: (index, prefix.to_owned()),
                     last: last.to_lowercase(),

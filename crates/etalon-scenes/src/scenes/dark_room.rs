@@ -1,13 +1,13 @@
 //! A nearly black room with tiny, very bright lamps.
 //!
 //! For bloom, exposure and everything that averages: six orders of magnitude
-//! between neighbouring pixels, lamps of less than a pixel, and radiance close
+//! between neighbouring pixels, lamps of about a pixel, and radiance close
 //! to the largest half float.
 
 use glam::DVec3;
 
 use super::{World, WorldError, moving_camera};
-use crate::trace::{Ambient, Material, SceneBuilder, Shape};
+use crate::trace::{Ambient, Light, Material, SceneBuilder, Shape};
 
 pub(super) fn build() -> Result<World, WorldError> {
     let mut scene = SceneBuilder::new();
@@ -36,17 +36,21 @@ pub(super) fn build() -> Result<World, WorldError> {
         Shape::Sphere { center: DVec3::new(0.55, 0.99, -1.05), radius: 0.18 },
         Material::plastic(DVec3::new(0.3, 0.02, 0.02), 0.1),
     );
-    // From one end of what a half float can hold to the other.
-    for (position, radius, radiance) in [
-        ([-0.5, 1.05, -1.0], 0.006, DVec3::new(60_000.0, 52_000.0, 40_000.0)),
-        ([-2.4, 2.3, -4.6], 0.012, DVec3::new(9_000.0, 14_000.0, 30_000.0)),
-        ([2.7, 1.5, -5.0], 0.020, DVec3::new(2_400.0, 600.0, 90.0)),
-        ([3.4, 3.2, -2.0], 0.030, DVec3::new(12.0, 90.0, 24.0)),
-        ([-3.6, 0.7, -2.5], 0.045, DVec3::new(6.0, 0.4, 9.0)),
-        ([0.9, 0.86, -0.7], 0.004, DVec3::new(0.0, 0.0, 60_000.0)),
-        ([1.6, 2.9, -5.9], 0.008, DVec3::new(60_000.0, 0.0, 0.0)),
+    // Shaded lamps: they look far brighter than the light they give. All but
+    // the last two are larger than a pixel of a picture 180 pixels high.
+    for (position, radius, radiance, intensity) in [
+        ([-0.5, 1.10, -1.0], 0.030, DVec3::new(60_000.0, 52_000.0, 40_000.0), 6.0),
+        ([-2.4, 2.3, -4.6], 0.040, DVec3::new(9_000.0, 14_000.0, 30_000.0), 12.0),
+        ([2.7, 1.5, -5.0], 0.045, DVec3::new(2_400.0, 600.0, 90.0), 4.0),
+        ([3.4, 3.2, -2.0], 0.050, DVec3::new(12.0, 90.0, 24.0), 0.3),
+        ([-3.6, 0.7, -2.5], 0.060, DVec3::new(6.0, 0.4, 9.0), 0.2),
+        ([0.9, 0.86, -0.7], 0.006, DVec3::new(0.0, 0.0, 60_000.0), 0.6),
+        ([1.6, 2.9, -5.8], 0.010, DVec3::new(60_000.0, 0.0, 0.0), 1.5),
     ] {
-        scene.lamp(DVec3::from_array(position), radius, radiance);
+        let center = DVec3::from_array(position);
+        scene.object(Shape::Sphere { center, radius }, Material::light(radiance));
+        let intensity = radiance * (intensity / radiance.max_element());
+        scene.light(Light::Point { position: center, intensity, body: radius * 1.001 });
     }
     let camera = moving_camera(
         [DVec3::new(-0.4, 1.6, 4.2), DVec3::new(0.0, 1.25, -2.0)],

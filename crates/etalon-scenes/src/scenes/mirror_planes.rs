@@ -4,8 +4,8 @@
 //! `z = −`[`WALL_DISTANCE`], so a ray from the eye `e` towards `d` with
 //! `d.y < 0` meets the mirror at `m = e − d (e.y − MIRROR_HEIGHT) / d.y`, and its
 //! mirror image, with `d.y` negated, meets the wall at
-//! `m + d' (−WALL_DISTANCE − m.z) / d'.z`. The camera is level, so parts of the
-//! wall that the mirror shows are beyond the upper edge of the picture.
+//! `m + d' (−WALL_DISTANCE − m.z) / d'.z`. The camera looks
+//! down, so parts of the wall that the mirror shows are above the picture.
 
 use glam::DVec3;
 
@@ -35,8 +35,8 @@ pub(super) fn build() -> Result<World, WorldError> {
         }),
     );
     let camera = moving_camera(
-        [DVec3::new(0.0, 1.0, 1.05), DVec3::new(0.0, 1.0, -1.0)],
-        [DVec3::new(0.0, 1.0, 1.0), DVec3::new(0.0, 1.0, -1.0)],
+        [DVec3::new(0.0, 1.0, 1.05), DVec3::new(0.0, 0.2, -1.0)],
+        [DVec3::new(0.0, 1.0, 1.0), DVec3::new(0.0, 0.2, -1.0)],
         60.0,
     )?;
     Ok(World { scene: scene.build()?, camera })

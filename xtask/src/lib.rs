@@ -4,4 +4,60 @@
 
 pub mod compare;
 pub mod drivers;
+pub mod execute;
 pub mod setup;
+pub mod size;
+pub mod test_backends;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Tasks of the Etalon project.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Arguments {
+    #[command(subcommand)]
+    task: Task,
+}
+
+#[derive(Debug, Subcommand)]
+enum Task {
+    TestBackends(Box<test_backends::Options>),
+    /// Run one job of test-backends.
+    #[command(hide = true, name = test_backends::COMMAND)]
+    Execute(execute::Job),
+}
+
+/// Runs the task that the command line asks for.
+#[must_use]
+pub fn main() -> ExitCode {
+    match Arguments::parse().task {
+        Task::TestBackends(options) => {
+            let tested = match std::env::current_exe() {
+                Ok(program) => {
+                    test_backends::run(&options, &program).map_err(|error| error.to_string())
+                }
+                Err(error) => Err(format!("this program cannot find itself: {error}")),
+            };
+            conclude(tested.map(|report| report.ok))
+        }
+        Task::Execute(job) => conclude(
+            execute::run(&job)
+                .map(|()| true)
+                .map_err(|error| error.to_string()),
+        ),
+    }
+}
+
+/// The exit status: success, or failure and on standard error why.
+fn conclude(result: Result<bool, String>) -> ExitCode {
+    match result {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -90,6 +90,19 @@ pub struct WorstTexel {
     pub ulps: Ulps,
 }
 
+impl fmt::Display for WorstTexel {
+    /// `x 3, y 1, layer 0, mip 2, blue: 0.5 became 0.75`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let TexelPosition { mip, layer, y, x } = self.position;
+        let channel = ["red", "green", "blue", "alpha"][self.channel.min(3)];
+        write!(
+            f,
+            "x {x}, y {y}, layer {layer}, mip {mip}, {channel}: {} became {}",
+            self.reference, self.subject
+        )
+    }
+}
+
 /// Why two images cannot be compared.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]

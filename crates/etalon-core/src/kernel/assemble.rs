@@ -9,11 +9,13 @@ use wesl::{
     CompileOptions, EscapeMangler, Feature, Features, ImportError, Mangler, ResolveError, Resolver,
 };
 
+use super::check;
 use super::compile::Variant;
 use super::error::KernelError;
+use super::files::{SourceFile, SourceFiles};
 use super::library::{Sources, Text};
 use super::scan;
-use super::source_map::{SourceFile, SourceFiles};
+use super::similar::similar;
 use super::{Arithmetic, library};
 
 /// The name of the feature that [`Arithmetic`] sets.
@@ -33,23 +35,48 @@ pub(super) struct Assembly {
     pub(super) names: Names,
 }
 
+/// Prints a tree as WGSL.
+///
+/// WESL 0.4 prints the negation of a negation, `- -x`, as `--x`, which is the
+/// token of a decrement. A decrement ends its statement, while a negation is
+/// followed by what it negates.
+pub(super) fn print(tree: &TranslationUnit) -> String {
+    let printed = tree.to_string();
+    let mut separated = String::with_capacity(printed.len());
+    let mut rest = printed.as_str();
+    while let Some(start) = rest.find("--") {
+        let (before, from) = rest.split_at(start);
+        let count = from.bytes().take_while(|byte| *byte == b'-').count();
+        let (minuses, after) = from.split_at(count);
+        separated.push_str(before);
+        if after.starts_with([';', ')', ' ', '\n']) || after.is_empty() {
+            separated.push_str(minuses);
+        } else {
+            separated.push_str(&vec!["-"; count].join(" "));
+        }
+        rest = after;
+    }
+    separated.push_str(rest);
+    separated
+}
+
 /// The original names of renamed declarations.
 ///
 /// Imported declarations get their module's path into their name, so that
 /// those of two files do not clash.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Names {
+pub(crate) struct Names {
     original: BTreeMap<String, String>,
 }
 
 impl Names {
     /// The name as written in the file.
-    pub(super) fn original<'a>(&'a self, name: &'a str) -> &'a str {
+    pub(crate) fn original<'a>(&'a self, name: &'a str) -> &'a str {
         self.original.get(name).map_or(name, String::as_str)
     }
 
     /// The text with every renamed word as it was written.
-    pub(super) fn restore(&self, text: &str) -> String {
+    pub(crate) fn restore(&self, text: &str) -> String {
         let mut restored = String::with_capacity(text.len());
         let mut rest = text;
         while let Some(start) = rest.find(|c: char| c.is_alphanumeric() || c == '_') {
@@ -132,7 +159,7 @@ fn check_features(
     files: &SourceFiles,
 ) -> Result<(), KernelError> {
     let mut known: BTreeSet<String> = BTreeSet::new();
-    for file in files.iter() {
+    for (_, file) in files.iter() {
         known.extend(scan::features(file.text()).into_iter().map(str::to_owned));
     }
     let missing = |known: &BTreeSet<String>| {
@@ -308,41 +335,6 @@ pub(super) fn file_name(path: &str) -> String {
     format!("{path}.wesl")
 }
 
-/// Up to three paths that look like `path`, closest first.
-fn similar(path: &str, all: &[&str]) -> Vec<String> {
-    let last = |path: &str| path.rsplit('/').next().unwrap_or_default().to_owned();
-    let name = last(path);
-    let mut found: Vec<(usize, &str)> = all
-        .iter()
-        .map(|other| {
-            let distance = distance(path, other).min(distance(&name, &last(other)) + 1);
-            (distance, *other)
-        })
-        .filter(|(distance, _)| *distance <= 3)
-        .collect();
-    found.sort_unstable();
-    found
-        .into_iter()
-        .take(3)
-        .map(|(_, path)| path.to_owned())
-        .collect()
-}
-
-/// Levenshtein distance in bytes: insertions, deletions and substitutions.
-fn distance(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, a) in a.bytes().enumerate() {
-        let mut diagonal = i;
-        row[0] = i + 1;
-        for (j, b) in b.bytes().enumerate() {
-            let substitution = diagonal + usize::from(a != b);
-            diagonal = row[j + 1];
-            row[j + 1] = substitution.min(diagonal + 1).min(row[j] + 1);
-        }
-    }
-    row[b.len()]
-}
-
 /// Finds, parses and renames for WESL, and notes down what it did.
 struct Modules<'a> {
     sources: &'a Sources,
@@ -395,14 +387,15 @@ impl Resolver for Modules<'_> {
             );
             return Err(refuse(0, message));
         }
-        scan::check_nesting(&text).map_err(|offset| {
-            let message = format!("nested more than {} levels deep", scan::MAX_NESTING);
+        check::check_tokens(&text).map_err(|(offset, message)| refuse(offset, message))?;
+        check::check_nesting(&text).map_err(|offset| {
+            let message = format!("nested more than {} levels deep", check::MAX_NESTING);
             refuse(offset, message)
         })?;
         self.parsed.set(self.parsed.get() + 1);
         // Blanks in front make the spans global offsets.
         let mut placed = " ".repeat(start);
-        placed.push_str(&text);
+        placed.push_str(&scan::hide_hex_floats(&text));
         placed.parse::<TranslationUnit>().map_err(|error| {
             ResolveError::Error(wesl::Diagnostic::from(wesl::Error::ParseError(error)))
         })
@@ -426,28 +419,6 @@ impl Mangler for Modules<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn distance_is_the_number_of_edits() {
-        for (a, b, edits) in [
-            ("", "", 0),
-            ("abc", "abc", 0),
-            ("", "abc", 3),
-            ("kitten", "sitting", 3),
-            ("flaw", "lawn", 2),
-        ] {
-            assert_eq!(distance(a, b), edits, "{a} {b}");
-            assert_eq!(distance(b, a), edits, "{b} {a}");
-        }
-    }
-
-    #[test]
-    fn similar_paths_are_close_in_whole_or_in_name() {
-        let all = ["bloom/down", "bloom/up", "ssr/march", "lib/colour"];
-        assert_eq!(similar("bloom/dwon", &all), ["bloom/down"]);
-        assert_eq!(similar("refraction/march", &all), ["ssr/march"]);
-        assert!(similar("nothing/alike", &all).is_empty());
-    }
 
     #[test]
     fn names_are_restored_word_by_word() {

@@ -9,7 +9,7 @@ use naga::{Module, ShaderStage, WithSpan};
 use super::assemble::{self, Assembly, Names};
 use super::error::KernelError;
 use super::library::Sources;
-use super::source_map::SourceMap;
+use super::source_map::{Misprint, SourceMap};
 use super::{Arithmetic, Kernel, KernelId, KernelRequest, lint, reflect, scan, specialise};
 
 /// The name every kernel's entry point has.
@@ -82,8 +82,16 @@ pub(super) fn compile(
         assemble::assemble(sources, variant, parsed)
     })?;
     guard(variant, "compiling", || {
-        let wgsl = tree.to_string();
-        let map = SourceMap::new(files, &tree, &wgsl);
+        let printed = assemble::print(&tree);
+        let map = SourceMap::new(files, &tree, &printed, &names).map_err(|Misprint(place)| {
+            let place = place.map_or_else(|| variant.path.clone(), |place| place.to_string());
+            KernelError::Internal {
+                kernel: variant.path.clone(),
+                stage: "printing",
+                message: format!("the declaration at {place} changed its shape"),
+            }
+        })?;
+        let wgsl = map.generated().to_owned();
         let origin = Origin {
             sources,
             variant,
@@ -92,6 +100,7 @@ pub(super) fn compile(
         };
         let parsed = parse(&wgsl, &origin)?;
         check_entry_point(&parsed, &origin)?;
+        reflect::check_places(&parsed, &origin)?;
         let info = validate(&parsed, &origin)?;
         let (mut module, constants) = specialise::specialise(&parsed, &info, &origin)?;
         naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
@@ -182,10 +191,9 @@ fn validate(module: &Module, origin: &Origin<'_>) -> Result<ModuleInfo, KernelEr
 
 /// Explains a validation error at the innermost place it knows.
 pub(super) fn invalid(error: &WithSpan<ValidationError>, origin: &Origin<'_>) -> KernelError {
-    let span = error
-        .spans()
-        .next()
-        .map_or(naga::Span::UNDEFINED, |(span, _)| *span);
+    // Outer places come first.
+    let span = error.spans().last();
+    let span = span.map_or(naga::Span::UNDEFINED, |(span, _)| *span);
     let mut message = error.as_inner().to_string();
     let mut source = std::error::Error::source(error.as_inner());
     while let Some(error) = source {
@@ -208,7 +216,12 @@ fn no_entry_point(module: &Module, origin: &Origin<'_>) -> KernelError {
         .iter()
         .map(|entry| {
             let stage = format!("{:?}", entry.stage).to_lowercase();
-            format!("`@{stage} fn {}`", origin.names.original(&entry.name))
+            let name = origin.names.original(&entry.name);
+            // naga does not keep the place of an entry point.
+            match scan::find_function(origin.map.generated(), &entry.name) {
+                Some(at) => format!("`@{stage} fn {name}` ({})", origin.map.locate_offset(at)),
+                None => format!("`@{stage} fn {name}`"),
+            }
         })
         .collect();
     KernelError::EntryPoint {

@@ -4,8 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
+use super::files::SourceLocation;
 use super::lint::Finding;
-use super::source_map::SourceLocation;
 
 /// A message about a place in a kernel's source.
 ///

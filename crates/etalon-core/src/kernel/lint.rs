@@ -36,7 +36,8 @@ use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{BinaryOperator, Expression, Handle, MathFunction, Module, ScalarKind, TypeInner};
 
 use super::error::write_excerpt;
-use super::source_map::{SourceLocation, SourceMap};
+use super::files::SourceLocation;
+use super::source_map::SourceMap;
 
 /// An operation whose result executors may disagree on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -150,9 +151,9 @@ fn inexact(expression: &Expression, types: &Types<'_>) -> Option<(String, &'stat
         }
         Expression::ImageSample { gather, .. } => {
             let name = if gather.is_some() {
-                "`textureGather`"
+                "`textureGather*`"
             } else {
-                "`textureSample`"
+                "`textureSample*`"
             };
             Some((name.to_owned(), LOAD))
         }

@@ -29,12 +29,15 @@
 
 mod assemble;
 mod binding;
+mod check;
 mod compile;
 mod error;
+mod files;
 mod library;
 pub mod lint;
 mod reflect;
 mod scan;
+mod similar;
 mod source_map;
 mod specialise;
 #[cfg(feature = "spirv")]
@@ -53,8 +56,9 @@ pub use binding::{
     ViewDimension,
 };
 pub use error::{Diagnostic, KernelError};
+pub use files::{GENERATED, SourceLocation};
 pub use library::{KernelLibrary, KernelStats};
-pub use source_map::{GENERATED, SourceLocation, SourceMap};
+pub use source_map::SourceMap;
 #[cfg(feature = "spirv")]
 pub use spirv::{NO_CONTRACTION_OPCODES, SpirvOptions, spirv};
 

@@ -1,5 +1,7 @@
 //! What a module binds.
 
+use std::collections::BTreeMap;
+
 use naga::valid::{FunctionInfo, ModuleInfo};
 use naga::{
     AddressSpace, ArraySize, GlobalVariable, Handle, ImageClass, ImageDimension, Module, Scalar,
@@ -15,10 +17,59 @@ use super::{
 use crate::Format;
 use crate::format::SampleKind;
 
+/// Checks that every resource says where it is bound, and each elsewhere.
+///
+/// Done before validation, whose messages about it name neither resource.
+///
+/// # Errors
+/// At the first resource of which that is not so.
+pub(super) fn check_places(module: &Module, origin: &Origin<'_>) -> Result<(), KernelError> {
+    let mut taken: BTreeMap<u32, &str> = BTreeMap::new();
+    let mut uniform: Option<&str> = None;
+    for (handle, variable) in module.global_variables.iter() {
+        if matches!(
+            variable.space,
+            AddressSpace::Private | AddressSpace::WorkGroup
+        ) {
+            continue;
+        }
+        let name = name(variable, origin);
+        let refuse = |message: String| {
+            let span = module.global_variables.get_span(handle);
+            Err(KernelError::Interface(origin.diagnostic(span, &message)))
+        };
+        let Some(place) = variable.binding else {
+            return refuse(format!(
+                "`{name}` needs an explicit `@group(0) @binding(…)`"
+            ));
+        };
+        if place.group != 0 {
+            return refuse(format!(
+                "`{name}` is in group {}; everything a kernel binds is in group 0",
+                place.group
+            ));
+        }
+        if let Some(other) = taken.insert(place.binding, name) {
+            return refuse(format!(
+                "`{name}` and `{other}` both have binding {}",
+                place.binding
+            ));
+        }
+        if variable.space == AddressSpace::Uniform
+            && let Some(other) = uniform.replace(name)
+        {
+            return refuse(format!(
+                "`{name}` and `{other}` are both uniform; a kernel has one uniform block"
+            ));
+        }
+    }
+    Ok(())
+}
+
 /// The bindings of the module's one entry point, by binding number.
 ///
 /// # Errors
-/// If a resource is of a kind that passes cannot fill, or where it cannot be.
+/// If a resource is of a kind that passes cannot fill.
 pub(super) fn bindings(
     module: &Module,
     info: &ModuleInfo,
@@ -34,48 +85,32 @@ pub(super) fn bindings(
         let Some(place) = variable.binding else {
             continue;
         };
-        let span = module.global_variables.get_span(handle);
-        let name = origin
-            .names
-            .original(variable.name.as_deref().unwrap_or_default());
-        let refuse = |message: String| KernelError::Interface(origin.diagnostic(span, &message));
-        if place.group != 0 {
-            let group = place.group;
-            return Err(refuse(format!(
-                "`{name}` is in group {group}; everything a kernel binds is in group 0"
-            )));
-        }
-        for other in &found {
-            if other.binding == place.binding {
-                let (a, b) = (&other.name, place.binding);
-                return Err(refuse(format!("`{name}` and `{a}` both have binding {b}")));
-            }
-            if other.name == name {
-                return Err(refuse(format!("two resources are called `{name}`")));
-            }
-            if matches!(other.kind, BindingKind::Uniform(_))
-                && variable.space == AddressSpace::Uniform
-            {
-                let a = &other.name;
-                return Err(refuse(format!(
-                    "`{name}` and `{a}` are both uniform; a kernel has one uniform block"
-                )));
-            }
+        let name = name(variable, origin);
+        let refuse = |reason: Reason| {
+            let span = module.global_variables.get_span(handle);
+            let message = format!("`{name}` {}", reason.message);
+            KernelError::Interface(origin.diagnostic(reason.span.unwrap_or(span), &message))
+        };
+        // An imported file may have a variable of the same name as the kernel.
+        if found.iter().any(|other| other.name == name) {
+            return Err(refuse("is the name of two resources".to_owned().into()));
         }
         found.push(Binding {
             name: name.to_owned(),
             group: place.group,
             binding: place.binding,
-            kind: reflection.kind(handle, variable).map_err(|reason| {
-                KernelError::Interface(origin.diagnostic(
-                    reason.span.unwrap_or(span),
-                    &format!("`{name}` {}", reason.message),
-                ))
-            })?,
+            kind: reflection.kind(handle, variable).map_err(refuse)?,
         });
     }
     found.sort_by_key(|binding| binding.binding);
     Ok(found)
+}
+
+/// The name of a variable in its file.
+fn name<'a>(variable: &'a GlobalVariable, origin: &'a Origin<'_>) -> &'a str {
+    origin
+        .names
+        .original(variable.name.as_deref().unwrap_or_default())
 }
 
 /// Why something cannot be bound.

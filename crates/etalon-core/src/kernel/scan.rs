@@ -3,8 +3,6 @@
 //! which overrides and bindings it declares, where a word stands, and how
 //! deeply it nests.
 
-use std::ops::Range;
-
 /// What a [`Token`] is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum TokenKind {
@@ -14,6 +12,8 @@ pub(crate) enum TokenKind {
     Number,
     /// One character of anything else.
     Punctuation,
+    /// A block comment that never ends.
+    Unclosed,
 }
 
 /// A piece of text that is neither white space nor comment.
@@ -25,13 +25,6 @@ pub(crate) struct Token<'a> {
     pub text: &'a str,
     /// Byte offset in the scanned text.
     pub offset: usize,
-}
-
-impl Token<'_> {
-    /// The bytes it takes up.
-    pub(crate) fn range(&self) -> Range<usize> {
-        self.offset..self.offset + self.text.len()
-    }
 }
 
 /// Splits WESL text into tokens, skipping `//` and nested `/* */` comments.
@@ -63,8 +56,10 @@ impl<'a> Tokens<'a> {
                         '\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}',
                     ])
                     .unwrap_or(trimmed.len());
-            } else if trimmed.starts_with("/*") {
-                self.offset += block_comment_len(trimmed);
+            } else if trimmed.starts_with("/*")
+                && let Some(len) = block_comment_len(trimmed)
+            {
+                self.offset += len;
             } else {
                 return;
             }
@@ -72,8 +67,8 @@ impl<'a> Tokens<'a> {
     }
 }
 
-/// Length of the block comment `text` starts with; all of it if it never ends.
-fn block_comment_len(text: &str) -> usize {
+/// Length of the block comment `text` starts with, if it ever ends.
+fn block_comment_len(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let mut depth = 0_usize;
     let mut at = 0;
@@ -87,13 +82,13 @@ fn block_comment_len(text: &str) -> usize {
                 depth -= 1;
                 at += 2;
                 if depth == 0 {
-                    return at;
+                    return Some(at);
                 }
             }
             _ => at += 1,
         }
     }
-    text.len()
+    None
 }
 
 /// Length of the number `text` starts with, including its suffix.
@@ -131,7 +126,9 @@ impl<'a> Iterator for Tokens<'a> {
         let second = rest.chars().nth(1);
         let number =
             first.is_ascii_digit() || (first == '.' && second.is_some_and(|c| c.is_ascii_digit()));
-        let (kind, len) = if number {
+        let (kind, len) = if rest.starts_with("/*") {
+            (TokenKind::Unclosed, rest.len())
+        } else if number {
             (TokenKind::Number, number_len(rest))
         } else if first.is_alphabetic() || first == '_' {
             let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_'));
@@ -147,6 +144,44 @@ impl<'a> Iterator for Tokens<'a> {
         self.offset += len;
         Some(token)
     }
+}
+
+impl Token<'_> {
+    /// Whether this is a hexadecimal floating-point literal, or would be if it
+    /// were valid.
+    fn is_hex_float(&self) -> bool {
+        let hexadecimal = self.text.starts_with("0x") || self.text.starts_with("0X");
+        self.kind == TokenKind::Number && hexadecimal && self.text.contains(['.', 'p', 'P'])
+    }
+}
+
+/// Whether a text has hexadecimal floating-point literals.
+pub(crate) fn has_hex_float(text: &str) -> bool {
+    tokens(text).any(|token| token.is_hex_float())
+}
+
+/// Replaces each hexadecimal floating-point literal by a decimal one of the
+/// same length and type.
+///
+/// WESL 0.4 takes their exponent to be one of 16 instead of 2, and refuses
+/// those with the suffix `f`.
+pub(crate) fn hide_hex_floats(text: &str) -> String {
+    let mut hidden = String::with_capacity(text.len());
+    let mut copied = 0;
+    for token in tokens(text).filter(Token::is_hex_float) {
+        hidden.push_str(text.get(copied..token.offset).unwrap_or_default());
+        copied = token.offset + token.text.len();
+        // Without an exponent, `f` is a digit.
+        let typed = token.text.contains(['p', 'P']);
+        let suffix = token.text.chars().next_back();
+        let suffix = suffix.filter(|c| typed && matches!(c, 'f' | 'h'));
+        let digits = token.text.chars().count() - 2 - usize::from(suffix.is_some());
+        hidden.push_str("1.");
+        hidden.extend(std::iter::repeat_n('0', digits));
+        hidden.extend(suffix);
+    }
+    hidden.push_str(text.get(copied..).unwrap_or_default());
+    hidden
 }
 
 /// The names in `@if(…)` and `@elif(…)` conditions, in order, with repeats.
@@ -228,62 +263,13 @@ pub(crate) fn find_word(text: &str, word: &str) -> Option<usize> {
         .map(|token| token.offset)
 }
 
-/// The most levels a kernel may nest, see [`check_nesting`].
-pub(crate) const MAX_NESTING: usize = 192;
-
-/// Finds the place where a text nests deeper than [`MAX_NESTING`].
-///
-/// Compilers walk syntax trees recursively, so a hostile text could exhaust
-/// the stack, which cannot be caught. Brackets nest, and so does each operator
-/// of a chain (`a + b + c` is a tree of depth three) and each `else` of an
-/// `else if` ladder; all are counted.
-pub(crate) fn check_nesting(text: &str) -> Result<(), usize> {
-    // Levels the current statement and the ladder around it have added so far,
-    // for each open bracket.
-    let mut open: Vec<usize> = vec![0];
-    let mut total = 0_usize;
-    let reset = |open: &mut Vec<usize>, total: &mut usize| {
-        if let Some(level) = open.last_mut() {
-            *total -= *level;
-            *level = 0;
-        }
-    };
-    let mut tokens = tokens(text).peekable();
-    while let Some(token) = tokens.next() {
-        match token.text {
-            "(" | "[" | "{" => {
-                open.push(0);
-                total += 1;
-            }
-            ")" | "]" | "}" => {
-                if open.len() > 1 {
-                    total -= open.pop().unwrap_or_default() + 1;
-                }
-                // A block ends a statement, unless a ladder goes on.
-                if token.text == "}" && tokens.peek().is_none_or(|t| t.text != "else") {
-                    reset(&mut open, &mut total);
-                }
-            }
-            ";" | "," => reset(&mut open, &mut total),
-            "else" => {
-                total += 1;
-                if let Some(level) = open.last_mut() {
-                    *level += 1;
-                }
-            }
-            "+" | "-" | "*" | "/" | "%" | "&" | "|" | "^" | "!" | "~" | "<" | ">" | "=" | "." => {
-                total += 1;
-                if let Some(level) = open.last_mut() {
-                    *level += 1;
-                }
-            }
-            _ => {}
-        }
-        if total > MAX_NESTING {
-            return Err(token.offset);
-        }
-    }
-    Ok(())
+/// Offset of the `fn` of the function with the given name.
+pub(crate) fn find_function(text: &str, name: &str) -> Option<usize> {
+    let after = tokens(text).skip(1);
+    tokens(text)
+        .zip(after)
+        .find(|(before, token)| before.text == "fn" && token.text == name)
+        .map(|(before, _)| before.offset)
 }
 
 #[cfg(test)]
@@ -301,11 +287,27 @@ mod tests {
             ["a", "f1", "(", "1.5e-3f", ",", ".5", ",", "0x1p-2", ")"]
         );
         assert_eq!(texts("1-2"), ["1", "-", "2"]);
-        assert_eq!(texts("a /* never ends"), ["a"]);
+        assert_eq!(texts("a /* never ends"), ["a", "/* never ends"]);
         assert_eq!(texts("é→"), ["é", "→"]);
         assert_eq!(texts(""), Vec::<&str>::new());
-        let offsets: Vec<_> = tokens(" a\n  bc").map(|t| t.range()).collect();
-        assert_eq!(offsets, [1..2, 5..7]);
+        let offsets: Vec<_> = tokens(" a\n  bc").map(|t| t.offset).collect();
+        assert_eq!(offsets, [1, 5]);
+    }
+
+    #[test]
+    fn hexadecimal_floats_are_hidden_behind_decimals_of_their_length() {
+        for (text, hidden) in [
+            ("a + 0x1p-3; // 0x1p-3", "a + 1.0000; // 0x1p-3"),
+            ("0x1.8p1f 0XA.p+2h 0x.8", "1.00000f 1.00000h 1.00"),
+            // `f` is a digit here.
+            ("0x1.f", "1.000"),
+            // Not hexadecimal, or no floats.
+            ("0x1f 1.5e-3f 0xepu", "0x1f 1.5e-3f 1.000"),
+        ] {
+            assert_eq!(hide_hex_floats(text), hidden);
+            assert_eq!(text.len(), hidden.len());
+            assert_eq!(has_hex_float(text), text != hidden);
+        }
     }
 
     #[test]
@@ -331,29 +333,10 @@ mod tests {
     }
 
     #[test]
-    fn nesting_is_bounded_wherever_it_comes_from() {
-        assert_eq!(check_nesting(""), Ok(()));
-        let deep = MAX_NESTING + 1;
-        for text in [
-            "(".repeat(deep),
-            format!("let a = {}1;", "-".repeat(deep)),
-            format!("let a = 1{};", "+1".repeat(deep)),
-            format!("if a {{}} {}", "else if b { let c = 1; } ".repeat(deep)),
-            "array<".repeat(deep),
-            "f(1+".repeat(deep / 2 + 1),
-        ] {
-            assert!(check_nesting(&text).is_err(), "{text}");
-        }
-        // The same amount side by side is no nesting.
-        for text in [
-            "f();".repeat(deep),
-            "a[1],".repeat(deep),
-            "if a { b(); } ".repeat(deep),
-            "let a = 1 + 2;".repeat(deep),
-            "))))".repeat(deep),
-        ] {
-            assert_eq!(check_nesting(&text), Ok(()), "{text}");
-        }
-        assert_eq!(check_nesting(&"(".repeat(deep)), Err(MAX_NESTING));
+    fn words_and_functions_are_found_whole_and_outside_of_comments() {
+        let text = "// main\nlet mainly = 1; fn main() {} main";
+        assert_eq!(find_word(text, "main"), text.find("main()"));
+        assert_eq!(find_function(text, "main"), text.find("fn main"));
+        assert_eq!(find_function(text, "mainly"), None);
     }
 }

@@ -4,154 +4,29 @@
 //! prints it. The nodes of that tree know where in the original files they
 //! stand; parsing the printed text gives a second tree of the same shape whose
 //! nodes know where in the generated text they stand. [`SourceMap`] is the two
-//! laid side by side, declaration by declaration. Where the shapes of a
-//! declaration differ, which the printer should not let happen, only the
-//! declaration as a whole is mapped: a location may become coarser, it is
-//! never wrong.
+//! laid side by side, declaration by declaration. Tokens behind the start of a
+//! node, such as the operator of a sum or the type of a variable, are matched
+//! one by one for as long as they are the same in both texts.
+//!
+//! Where the shapes of a declaration differ, which the printer should not let
+//! happen, only the declaration as a whole is mapped: a location may become
+//! coarser, it is never wrong.
+//!
+//! The same correspondence puts numbers back as they were written: WESL 0.4
+//! takes `0x1p1` to be 16, and every bit of a constant counts.
 
-use std::fmt;
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
 use wesl::syntax::TranslationUnit;
 
+use super::assemble::Names;
 use super::error::Diagnostic;
+use super::files::{GENERATED, SourceFile, SourceFiles, SourceLocation};
 use super::library::Text;
+use super::scan::{self, Token, TokenKind};
 use super::syntax::{self, Node};
 
-/// The file name of places that only exist in generated text.
-pub const GENERATED: &str = "generated WGSL";
-
-/// A place in a kernel's source, shown as `ssr/march.wesl:41:17`.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct SourceLocation {
-    /// The kernel's path with extension, or [`GENERATED`].
-    pub file: String,
-    /// Line, from 1.
-    pub line: u32,
-    /// Column in characters, from 1.
-    pub column: u32,
-}
-
-impl fmt::Display for SourceLocation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file, self.line, self.column)
-    }
-}
-
-/// A named text whose lines are known.
-#[derive(Clone, Debug)]
-pub(crate) struct SourceFile {
-    name: String,
-    text: Text,
-    /// Offset of the first byte of each line; never empty.
-    lines: Vec<usize>,
-}
-
-impl SourceFile {
-    pub(crate) fn new(name: String, text: Text) -> Self {
-        let lines = std::iter::once(0)
-            .chain(text.match_indices('\n').map(|(at, _)| at + 1))
-            .collect();
-        Self { name, text, lines }
-    }
-
-    pub(crate) fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// The number of the line `offset` is in, from 0, and that line's bytes.
-    fn line(&self, offset: usize) -> (usize, Range<usize>) {
-        let index = self.lines.partition_point(|&start| start <= offset) - 1;
-        let start = self.lines[index];
-        let end = self
-            .lines
-            .get(index + 1)
-            .map_or(self.text.len(), |next| next - 1);
-        (index, start..end)
-    }
-
-    /// The place of a byte; behind the end counts as the end.
-    pub(crate) fn locate(&self, offset: usize) -> SourceLocation {
-        let offset = offset.min(self.text.len());
-        let (index, line) = self.line(offset);
-        let before = self.text.as_bytes().get(line.start..offset);
-        // Counting the bytes that begin a character works inside of one, too.
-        let column = before.map_or(0, |bytes| {
-            bytes.iter().filter(|&&byte| byte & 0xc0 != 0x80).count()
-        });
-        let number = |n: usize| u32::try_from(n + 1).unwrap_or(u32::MAX);
-        SourceLocation {
-            file: self.name.clone(),
-            line: number(index),
-            column: number(column),
-        }
-    }
-
-    /// A message about a byte of this file.
-    pub(crate) fn diagnostic(&self, offset: usize, message: String) -> Diagnostic {
-        let offset = offset.min(self.text.len());
-        let (_, line) = self.line(offset);
-        Diagnostic {
-            location: self.locate(offset),
-            message,
-            line: self
-                .text
-                .get(line)
-                .unwrap_or_default()
-                .trim_end()
-                .to_owned(),
-        }
-    }
-}
-
-/// The files of one kernel, laid end to end: a byte of any of them has one
-/// number, its global offset.
-///
-/// Giving the parser each file at its global offset makes every span of the
-/// assembled tree say which file it is from.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct SourceFiles {
-    /// Each file with the global offset of its first byte, ascending.
-    files: Vec<(usize, SourceFile)>,
-}
-
-impl SourceFiles {
-    /// Adds a file and returns the global offset of its first byte.
-    pub(crate) fn add(&mut self, file: SourceFile) -> usize {
-        // One byte apart, so that the end of a file is not the start of the
-        // next.
-        let start = self
-            .files
-            .last()
-            .map_or(0, |(start, last)| start + last.text.len() + 1);
-        self.files.push((start, file));
-        start
-    }
-
-    /// The file a global offset is in, and the offset in the file.
-    pub(crate) fn file(&self, offset: usize) -> Option<(&SourceFile, usize)> {
-        let index = self
-            .files
-            .partition_point(|(start, _)| *start <= offset)
-            .checked_sub(1)?;
-        let (start, file) = self.files.get(index)?;
-        (offset - start <= file.text.len()).then_some((file, offset - start))
-    }
-
-    /// The file with the given name.
-    pub(crate) fn named(&self, name: &str) -> Option<&SourceFile> {
-        let (_, file) = self.files.iter().find(|(_, file)| file.name == name)?;
-        Some(file)
-    }
-
-    /// All files in order of addition.
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &SourceFile> {
-        self.files.iter().map(|(_, file)| file)
-    }
-}
-
-/// A stretch of generated text and the place it was made from.
+/// A node of the generated text and the place it was made from.
 #[derive(Clone, Debug)]
 struct Mapping {
     generated: Range<usize>,
@@ -161,6 +36,83 @@ struct Mapping {
     parent: Option<usize>,
 }
 
+/// A token that stands in both texts.
+#[derive(Clone, Debug)]
+struct Match {
+    generated: Range<usize>,
+    /// Global offset of the first byte of the original.
+    original: usize,
+}
+
+/// The nodes of one declaration in both texts, outermost first.
+struct Pair {
+    original: Vec<Node>,
+    printed: Vec<Node>,
+}
+
+impl Pair {
+    fn same_shape(&self) -> bool {
+        self.original.len() == self.printed.len()
+            && self
+                .original
+                .iter()
+                .zip(&self.printed)
+                .all(|(original, printed)| original.kind == printed.kind)
+    }
+}
+
+/// Whether a token names an imported declaration, which the file may call by
+/// another name or by a path.
+fn imported(token: &Token<'_>, names: &Names) -> bool {
+    names.original(token.text) != token.text
+}
+
+/// How many tokens the rest `::a::b` of a path takes.
+fn path_len(tokens: &[Token<'_>]) -> usize {
+    let step = |step: &&[Token<'_>]| matches!(step, [a, b, c] if a.text == ":" && b.text == ":" && c.kind == TokenKind::Word);
+    3 * tokens.chunks(3).take_while(step).count()
+}
+
+/// Spells the numbers of the printed text as they were written, and moves the
+/// spans of the printed nodes accordingly.
+fn restore_numbers(files: &SourceFiles, pairs: &mut [Pair], printed: &str) -> String {
+    // What is replaced, in order, and how far what is behind it moves: offsets
+    // wrap around where it moves forward.
+    let mut moves: Vec<(usize, usize)> = Vec::new();
+    let mut restored = String::with_capacity(printed.len());
+    let mut copied = 0;
+    for pair in pairs.iter() {
+        for (original, node) in pair.original.iter().zip(&pair.printed) {
+            let written = files.text(original.span.clone());
+            let (true, Some(written), Some(before)) = (
+                node.is_literal(),
+                written,
+                printed.get(copied..node.span.start),
+            ) else {
+                continue;
+            };
+            restored.push_str(before);
+            restored.push_str(written);
+            copied = node.span.end;
+            moves.push((copied, restored.len().wrapping_sub(copied)));
+        }
+    }
+    restored.push_str(printed.get(copied..).unwrap_or_default());
+    let moved = |offset: usize| {
+        let behind = moves.partition_point(|(end, _)| *end <= offset);
+        let by = behind.checked_sub(1).map_or(0, |index| moves[index].1);
+        offset.wrapping_add(by)
+    };
+    for node in pairs.iter_mut().flat_map(|pair| &mut pair.printed) {
+        node.span = moved(node.span.start)..moved(node.span.end);
+    }
+    restored
+}
+
+/// A declaration was not printed as it was read, at the given place.
+#[derive(Debug)]
+pub(crate) struct Misprint(pub(crate) Option<SourceLocation>);
+
 /// Where each part of a kernel's generated WGSL comes from.
 #[derive(Clone, Debug)]
 pub struct SourceMap {
@@ -168,39 +120,100 @@ pub struct SourceMap {
     generated: SourceFile,
     /// In order of start, outer before inner.
     mappings: Vec<Mapping>,
+    /// In order of start; they do not overlap.
+    matches: Vec<Match>,
 }
 
 impl SourceMap {
     /// Lays `assembled`, whose spans are global offsets in `files`, beside the
-    /// text printed from it.
-    pub(crate) fn new(files: SourceFiles, assembled: &TranslationUnit, printed: &str) -> Self {
+    /// text printed from it. `names` has the names that assembling changed.
+    ///
+    /// In the generated text, numbers are spelled as in the files: reading and
+    /// printing them is not left to WESL, see [`scan::hide_hex_floats`].
+    ///
+    /// # Errors
+    /// If a declaration has numbers that have to be put back, but is not of
+    /// the same shape in both texts.
+    pub(crate) fn new(
+        files: SourceFiles,
+        assembled: &TranslationUnit,
+        printed: &str,
+        names: &Names,
+    ) -> Result<Self, Misprint> {
+        let originals = syntax::declarations(assembled);
+        let reparsed = printed.parse::<TranslationUnit>().unwrap_or_default();
+        let reparsed = syntax::declarations(&reparsed);
+        let aligned = originals.len() == reparsed.len();
+        let mut pairs = Vec::with_capacity(originals.len());
+        for (index, original) in originals.iter().enumerate() {
+            let mut pair = Pair {
+                original: syntax::nodes(original),
+                printed: match reparsed.get(index) {
+                    Some(printed) if aligned => syntax::nodes(printed),
+                    _ => Vec::new(),
+                },
+            };
+            if !pair.same_shape() {
+                let text = files.text(original.span().range());
+                if text.is_some_and(scan::has_hex_float) {
+                    let place = files.file(original.span().start);
+                    return Err(Misprint(place.map(|(file, at)| file.locate(at))));
+                }
+                pair.original.truncate(1);
+                pair.printed.truncate(1);
+            }
+            pairs.push(pair);
+        }
+        let generated = restore_numbers(&files, &mut pairs, printed);
         let mut map = Self {
             files,
-            generated: SourceFile::new(GENERATED.to_owned(), Text::Added(printed.into())),
+            generated: SourceFile::new(GENERATED.to_owned(), Text::Added(generated.into())),
             mappings: Vec::new(),
+            matches: Vec::new(),
         };
-        let Ok(reparsed) = map.generated.text.parse::<TranslationUnit>() else {
-            return map;
-        };
-        let originals = syntax::declarations(assembled);
-        let printed = syntax::declarations(&reparsed);
-        if originals.len() != printed.len() {
-            return map;
+        let first = pairs.iter().find_map(|pair| pair.printed.first());
+        map.match_directives(first.map_or(0, |node| node.span.start));
+        for pair in &pairs {
+            map.add(pair, names);
         }
-        for (original, printed) in originals.iter().zip(&printed) {
-            map.add(&syntax::nodes(original), &syntax::nodes(printed));
+        Ok(map)
+    }
+
+    /// Matches the tokens of `enable`, `requires` and `diagnostic` directives,
+    /// which stand before byte `end`. They are no nodes, but printed as they
+    /// are written.
+    fn match_directives(&mut self, end: usize) {
+        let head = self.generated.text().get(..end).unwrap_or_default();
+        let tokens: Vec<Token<'_>> = scan::tokens(head).collect();
+        let mut matches = Vec::new();
+        for directive in tokens.split_inclusive(|token| token.text == ";") {
+            let found = self.files.iter().find_map(|(start, file)| {
+                let written: Vec<Token<'_>> = scan::tokens(file.text()).collect();
+                let same = |window: &&[Token<'_>]| {
+                    let pairs = window.iter().zip(directive);
+                    pairs.into_iter().all(|(a, b)| a.text == b.text)
+                };
+                let offsets = |window: &[Token<'_>]| -> Vec<usize> {
+                    window.iter().map(|token| start + token.offset).collect()
+                };
+                written.windows(directive.len()).find(same).map(offsets)
+            });
+            for (token, original) in directive.iter().zip(found.unwrap_or_default()) {
+                matches.push(Match {
+                    generated: token.offset..token.offset + token.text.len(),
+                    original,
+                });
+            }
         }
-        map
+        self.matches.extend(matches);
     }
 
     /// Adds the nodes of one declaration, outermost first.
-    fn add(&mut self, original: &[Node], printed: &[Node]) {
-        let same = original.len() == printed.len()
-            && original.iter().zip(printed).all(|(a, b)| a.kind == b.kind);
-        let used = if same { printed.len() } else { 1 };
-        for (original, printed) in original.iter().zip(printed).take(used) {
+    fn add(&mut self, pair: &Pair, names: &Names) {
+        let first = self.mappings.len();
+        for (original, printed) in pair.original.iter().zip(&pair.printed) {
             // Nodes made by the compiler stand nowhere.
-            if original.span.is_empty() {
+            if original.span.is_empty() || printed.span.is_empty() {
                 continue;
             }
             let mut parent = self.mappings.len().checked_sub(1);
@@ -215,6 +228,84 @@ impl SourceMap {
                 parent,
             });
         }
+        if let (Some(original), Some(printed)) = (pair.original.first(), pair.printed.first()) {
+            self.match_tokens(&original.span, &printed.span, first, names);
+        }
+    }
+
+    /// Matches the tokens of one declaration, whose nodes are the mappings
+    /// from index `first` on.
+    ///
+    /// Nodes are in the same order in both texts, so each tells where the
+    /// original goes on. From there tokens are matched until one differs: what
+    /// the original has and the generated text has not is comments, which are
+    /// no tokens, and conditional parts. Those begin with an `@`, and every
+    /// `@` of the generated text begins a node, so neither can be mistaken for
+    /// the other.
+    fn match_tokens(
+        &mut self,
+        original: &Range<usize>,
+        printed: &Range<usize>,
+        first: usize,
+        names: &Names,
+    ) {
+        let Some(text) = self.files.text(original.clone()) else {
+            return;
+        };
+        let originals: Vec<Token<'_>> = scan::tokens(text).collect();
+        let Some(generated) = self.generated.text().get(printed.clone()) else {
+            return;
+        };
+        let mut nodes = self.mappings[first..].iter().peekable();
+        // Where the original goes on, as long as that is known.
+        let mut next: Option<usize> = None;
+        let mut matches = Vec::new();
+        for token in scan::tokens(generated) {
+            let at = printed.start + token.offset;
+            while let Some(node) = nodes.next_if(|node| node.generated.start <= at) {
+                if node.generated.start == at {
+                    let offset = node.original.checked_sub(original.start);
+                    next = offset.and_then(|offset| {
+                        originals
+                            .binary_search_by_key(&offset, |token| token.offset)
+                            .ok()
+                    });
+                }
+            }
+            // The comma behind the last of a list is not printed.
+            if let Some(index) = next
+                && let Some([comma, closing]) = originals.get(index..index + 2)
+                && comma.text == ","
+                && closing.text == token.text
+            {
+                next = Some(index + 1);
+            }
+            let found = next.and_then(|index| originals.get(index)).filter(|other| {
+                let before_next_node = nodes
+                    .peek()
+                    .is_none_or(|node| original.start + other.offset < node.original);
+                before_next_node
+                    && (token.text == other.text
+                        || imported(&token, names) && other.kind == TokenKind::Word)
+            });
+            next = match (next, found) {
+                (Some(index), Some(other)) => {
+                    matches.push(Match {
+                        generated: at..at + token.text.len(),
+                        original: original.start + other.offset,
+                    });
+                    let behind = originals.get(index + 1..).unwrap_or_default();
+                    let path = if imported(&token, names) {
+                        path_len(behind)
+                    } else {
+                        0
+                    };
+                    Some(index + 1 + path)
+                }
+                _ => None,
+            };
+        }
+        self.matches.extend(matches);
     }
 
     /// Moves a global offset behind the `@if`, `@elif` and `@else` it stands
@@ -223,14 +314,14 @@ impl SourceMap {
         let Some((file, offset)) = self.files.file(start) else {
             return start;
         };
-        let text = file.text.get(offset..).unwrap_or_default();
+        let text = file.text().get(offset..).unwrap_or_default();
         start + syntax::conditions_len(text)
     }
 
     /// The generated WGSL.
     #[must_use]
     pub fn generated(&self) -> &str {
-        &self.generated.text
+        self.generated.text()
     }
 
     /// The original place of a span of the generated WGSL.
@@ -241,9 +332,9 @@ impl SourceMap {
 
     /// The original place of a byte of the generated WGSL.
     ///
-    /// The innermost expression, statement or declaration around the byte
-    /// decides; a byte outside of all of them is located in the generated
-    /// text.
+    /// That of the token it is in; if that is not known, that of the innermost
+    /// expression, statement or declaration around it; and outside of all of
+    /// them, its place in the generated text.
     #[must_use]
     pub fn locate_offset(&self, offset: usize) -> SourceLocation {
         let (file, offset) = self.resolve(offset);
@@ -258,6 +349,15 @@ impl SourceMap {
     }
 
     fn resolve(&self, offset: usize) -> (&SourceFile, usize) {
+        let matched = self
+            .matches
+            .partition_point(|it| it.generated.start <= offset)
+            .checked_sub(1)
+            .map(|index| &self.matches[index])
+            .filter(|it| offset < it.generated.end);
+        if let Some(found) = matched.and_then(|it| self.files.file(it.original)) {
+            return found;
+        }
         let mut index = self
             .mappings
             .partition_point(|mapping| mapping.generated.start <= offset)

@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use wesl::syntax::{
     Attribute, AttributeNode, CaseSelector, CompoundStatement, Expression, ExpressionNode,
-    GlobalDeclaration, GlobalDeclarationNode, Statement, StatementNode, TranslationUnit,
-    TypeExpression,
+    GlobalDeclaration, GlobalDeclarationNode, LiteralExpression, Statement, StatementNode,
+    TranslationUnit, TypeExpression,
 };
 
 use super::scan;
@@ -26,6 +26,14 @@ pub(super) enum NodeKind {
 pub(super) struct Node {
     pub(super) kind: NodeKind,
     pub(super) span: Range<usize>,
+}
+
+impl Node {
+    /// Whether this is a literal: a number, `true` or `false`.
+    pub(super) fn is_literal(&self) -> bool {
+        let literal = Expression::Literal(LiteralExpression::Bool(true));
+        self.kind == NodeKind::Expression(discriminant(&literal))
+    }
 }
 
 /// The declarations of a module without the empty ones, which are not printed.
@@ -224,7 +232,12 @@ impl Walk {
             }
             Statement::While(statement) => {
                 self.attributes(&statement.attributes);
-                self.expression(&statement.condition);
+                // Printed with parentheses whether it has any or not.
+                let mut condition = &statement.condition;
+                while let Expression::Parenthesized(inner) = condition.node() {
+                    condition = &inner.expression;
+                }
+                self.expression(condition);
                 self.block(&statement.body);
             }
             Statement::Return(statement) => self.optional(statement.expression.as_ref()),

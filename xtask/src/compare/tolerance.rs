@@ -147,7 +147,8 @@ impl Tolerance {
             return Ok(Verdict::Pass);
         }
         Ok(Verdict::Fail(format!(
-            "{beyond} texels ({:.3} %) are not {}",
+            "{beyond} texel{} ({:.3} %) not {}",
+            if beyond == 1 { "" } else { "s" },
             share * 100.0,
             self.summary()
         )))

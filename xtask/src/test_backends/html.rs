@@ -67,10 +67,12 @@ fn header(body: &mut String, report: &Report) {
     let _ = write!(
         body,
         "<header>\n<h1>Backends compared</h1>\n<p class=\"verdict {class}\">{verdict}</p>\n\
-         <p class=\"muted\">{} × {} pixels · frames: {} · scenes: {} · arithmetic: {} · required: {}</p>\n",
+         <p class=\"muted\">{} × {} pixels · frames: {} · effect: {} · scenes: {} · arithmetic: {} · \
+         required: {}</p>\n",
         settings.width,
         settings.height,
         settings.frames,
+        escape(&settings.effect),
         escape(&settings.scenes.join(", ")),
         escape(&settings.arithmetic.join(", ")),
         escape(&required.join(", ")),
@@ -350,8 +352,14 @@ fn pictures(body: &mut String, output: &Output<'_>) {
         );
     }
     body.push_str("</div>\n");
+    // What is worth a look against the reference: the first that disagrees.
+    let suspect = shown
+        .iter()
+        .find(|(comparison, _)| !comparison.verdict.passed());
     let (second, second_path) = images
-        .get(1)
+        .iter()
+        .find(|(name, _)| suspect.is_some_and(|(comparison, _)| comparison.subject == *name))
+        .or(images.get(1))
         .map_or((first, first_path), |(name, path)| (name, path));
     let options = |selected: &str| {
         images

@@ -43,7 +43,7 @@ fn a_noisy_texel_fails_and_its_pass_and_executor_are_named() {
     assert!(
         report.problems[0].starts_with(
             "ash/lavapipe disagrees with cpu (test <scene>, strict arithmetic), first in pass `ssr/mix`, output \
-             `target`, frame 0: 1 texels (0.019 %) are not bit equal; 1 of 3 outputs are affected"
+             `target`, frame 0: 1 texel (0.019 %) not bit equal; 1 of 3 outputs are affected"
         ),
         "{:?}",
         report.problems

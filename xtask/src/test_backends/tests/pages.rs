@@ -86,7 +86,7 @@ fn the_json_has_every_comparison() {
             .unwrap()
             .contains("correctly rounded")
     );
-    assert!(failed["why"].as_str().unwrap().starts_with("1 texels"));
+    assert!(failed["why"].as_str().unwrap().starts_with("1 texel ("));
     assert_eq!(failed["figures"]["differing_texels"], 1);
     assert_eq!(failed["figures"]["worst"]["x"], 3);
     assert!(failed["figures"]["max_ulp"].as_u64().unwrap() > 0);

@@ -1,1 +1,90 @@
-//! .
+//! The Vulkan backend of Etalon, on [`ash`].
+//!
+//! # In an engine
+//! [`AshBackend::adopt`] takes the engine's device; [`AshBackend::record`]
+//! records a [`Plan`](etalon_core::plan::Plan) into the engine's command
+//! buffer, reading and writing the engine's own images and buffers. Nothing is
+//! submitted, waited for or destroyed that is the engine's.
+//!
+//! # On its own
+//! [`AshBackend::new`] makes an instance and a device, and the
+//! [`Backend`](etalon_core::backend::Backend) trait runs plans with inputs
+//! from the host.
+//!
+//! # Frames in flight
+//! [`AshOptions::frames_in_flight`] is a promise: when a recording begins, the
+//! one that many before it has left the GPU. Host-visible memory for uniform
+//! blocks is a ring of one copy more than that, descriptor sets are written anew
+//! only after it, and what is no longer needed is destroyed after it.
+//!
+//! # What a frame costs
+//! Everything but the values of uniforms is made once per
+//! [`Plan::structure`](etalon_core::plan::Plan::structure) and kept for the
+//! [`AshOptions::plans_kept`] structures used last. A frame whose structure is
+//! among them allocates no memory, and creates no pipeline and no descriptor
+//! set; [`counters`](etalon_core::backend::Backend::counters) shows it.
+//! Pipelines are kept for as long as the backend.
+//!
+//! # Barriers and memory
+//! Both are the plan's. How usages become stages, accesses and layouts is one
+//! table in the source of `usage`; one `vkCmdPipelineBarrier2` before each step
+//! has the barriers of that step and no others. Transient textures live in one
+//! allocation and transient buffers in another, at the offsets planned; plan
+//! with [`Backend::memory`](etalon_core::backend::Backend::memory), so that
+//! these are the device's own sizes.
+//!
+//! # Devices
+//! Vulkan 1.3 with `synchronization2` and `maintenance4`, which every 1.3
+//! device has, and a queue that computes. [`enumerate`] lists what there is.
+
+mod backend;
+mod buffer;
+mod check;
+mod commands;
+mod convert;
+mod device;
+mod engine;
+mod error;
+mod heap;
+mod history;
+mod host;
+mod image;
+mod instance;
+mod memory;
+mod physical;
+mod pipeline;
+mod prepared;
+mod run;
+mod sets;
+mod texels;
+mod uniforms;
+mod usage;
+mod validation;
+
+use std::sync::Arc;
+
+pub use backend::{AshBackend, AshOptions};
+pub use device::AdoptedDevice;
+pub use engine::{
+    AdoptedBuffer, AdoptedTexture, AshBindings, AshBuffer, AshOutputs, AshTexture, BufferState,
+    OutputBuffer, OutputTexture, TextureState,
+};
+pub use physical::{DeviceInfo, DeviceKind, Features, enumerate};
+pub use validation::{Validation, ValidationLog, ValidationMessage};
+
+/// A texture or buffer behind a number in a plan.
+#[derive(Clone)]
+enum Resource {
+    Texture(Arc<image::Image>),
+    Buffer(Arc<buffer::Buffer>),
+}
+
+impl Resource {
+    /// Its identity, which no other ever has.
+    fn id(&self) -> u64 {
+        match self {
+            Self::Texture(image) => image.id,
+            Self::Buffer(buffer) => buffer.id,
+        }
+    }
+}

@@ -1,0 +1,587 @@
+//! The backend: plans in, commands out.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use ash::vk;
+use etalon_core::backend::{Backend, BackendError, BackendInfo, Counters, Execution, Inputs};
+use etalon_core::plan::{MemoryModel, Plan, ResourceKind, Step};
+use etalon_core::resource::Limits;
+
+use crate::buffer::Buffer;
+use crate::commands::{Barriers, Commands};
+use crate::device::{AdoptedDevice, Device};
+use crate::engine::{
+    self, AdoptedBuffer, AdoptedTexture, AshBindings, AshBuffer, AshOutputs, AshTexture, Given,
+    TextureState,
+};
+use crate::error::{NAME, malformed, unsupported};
+use crate::history::{self, Histories, Pair};
+use crate::host::{self, HostQueue, HostSide};
+use crate::image::{self, Image};
+use crate::instance::Instance;
+use crate::memory::DeviceMemory;
+use crate::prepared::{Prepared, Shared};
+use crate::run::Run;
+use crate::sets::Parts;
+use crate::validation::{Validation, ValidationLog};
+use crate::{Resource, physical};
+
+/// How a backend is made.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct AshOptions {
+    /// Part of the name of the device to use, in any case of letters. Without,
+    /// the first of the kind most preferred: discrete, integrated, virtual,
+    /// software. Of no use with an adopted device.
+    pub device: Option<String>,
+    /// What the Khronos validation layer checks. Of no use with an adopted
+    /// device, whose instance is the engine's.
+    pub validation: Validation,
+    /// Whether [`Backend::execute`] fails with [`BackendError::Validation`]
+    /// when the layer has said anything during it. Otherwise messages are
+    /// only collected, see [`AshBackend::validation_log`].
+    pub validation_fails: bool,
+    /// The most recordings that are still to run or running on the GPU when
+    /// another is recorded: the number of frames in flight times the number of
+    /// plans recorded for each. At least 1.
+    pub frames_in_flight: u32,
+    /// How many structures of plans to keep prepared, the least recently used
+    /// of more being dropped. At least 1.
+    pub plans_kept: usize,
+}
+
+impl Default for AshOptions {
+    /// Any device, no validation, two frames in flight, eight plans kept.
+    fn default() -> Self {
+        Self {
+            device: None,
+            validation: Validation::Off,
+            validation_fails: true,
+            frames_in_flight: 2,
+            plans_kept: 8,
+        }
+    }
+}
+
+/// Runs plans on a Vulkan device. See the [crate documentation](crate).
+pub struct AshBackend {
+    options: AshOptions,
+    memory: DeviceMemory,
+    shared: Shared,
+    /// By structure, the least recently used first.
+    prepared: Vec<(u64, Prepared)>,
+    histories: Histories,
+    host: Option<HostQueue>,
+    /// The engine's recordings that may not have left the GPU, oldest first.
+    under_way: VecDeque<u64>,
+    device: Arc<Device>,
+}
+
+impl std::fmt::Debug for AshBackend {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AshBackend")
+            .field("info", &self.info())
+            .field("options", &self.options)
+            .field("counters", &self.counters())
+            .finish_non_exhaustive()
+    }
+}
+
+impl AshBackend {
+    /// A backend with an instance and a device of its own.
+    ///
+    /// # Errors
+    /// [`BackendError::NoDevice`] without a Vulkan loader, a suitable device or
+    /// the validation layer asked for; otherwise what Vulkan says.
+    pub fn new(options: AshOptions) -> Result<Self, BackendError> {
+        let instance = Instance::new(options.validation)?;
+        let physical = physical::choose(&instance, options.device.as_deref())?;
+        Ok(Self::with(Device::new(instance, physical)?, options))
+    }
+
+    /// A backend on an engine's device. It makes objects and allocates memory
+    /// there, and destroys what it has made, nothing else.
+    ///
+    /// # Errors
+    /// [`BackendError::NoDevice`] if the device lacks something, by name.
+    ///
+    /// # Safety
+    /// * The handles are valid, belong together, and outlive the backend and
+    ///   everything made with it.
+    /// * The features stated are enabled; if `debug_utils` is set, so is that
+    ///   extension.
+    /// * The promise of [`AshOptions::frames_in_flight`] is kept.
+    /// * When the backend is dropped, and when an [`AshTexture`] or
+    ///   [`AshBuffer`] is dropped after it, everything recorded with it has
+    ///   left the GPU.
+    /// * During [`Backend::execute`], which submits and waits, nobody else uses
+    ///   the queue.
+    pub unsafe fn adopt(adopted: AdoptedDevice, options: AshOptions) -> Result<Self, BackendError> {
+        Ok(Self::with(Device::adopt(adopted)?, options))
+    }
+
+    fn with(device: Device, options: AshOptions) -> Self {
+        let device = Arc::new(device);
+        Self {
+            options: AshOptions {
+                frames_in_flight: options.frames_in_flight.max(1),
+                plans_kept: options.plans_kept.max(1),
+                ..options
+            },
+            memory: DeviceMemory::new(device.clone()),
+            shared: Shared::default(),
+            prepared: Vec::new(),
+            histories: Histories::default(),
+            host: None,
+            under_way: VecDeque::new(),
+            device,
+        }
+    }
+
+    /// What the validation layer has said since the backend was made, if it is
+    /// on. The log outlives the backend, and has the last word about leaks.
+    #[must_use]
+    pub fn validation_log(&self) -> Option<Arc<ValidationLog>> {
+        self.device.instance.log.clone()
+    }
+
+    /// Makes an engine's image known, for [`AshBindings`].
+    ///
+    /// # Errors
+    /// [`BackendError::InputMismatch`] for a description that no image of the
+    /// device can have.
+    ///
+    /// # Safety
+    /// The image is of the backend's device, is as described, and lives as long
+    /// as the texture. Recordings that were given the texture have left the GPU
+    /// before it is destroyed.
+    pub unsafe fn adopt_texture(
+        &self,
+        adopted: AdoptedTexture,
+    ) -> Result<AshTexture, BackendError> {
+        let AdoptedTexture { image, desc, usage } = adopted;
+        image::check(&self.device, &desc, usage).map_err(|given| BackendError::InputMismatch {
+            name: format!("{image:?}"),
+            given,
+            wanted: "an image that this device can have".to_owned(),
+        })?;
+        Ok(AshTexture {
+            image: Image::adopted(&self.device, image, &desc, usage),
+            device: self.device.clone(),
+        })
+    }
+
+    /// Makes part of an engine's buffer known, for [`AshBindings`].
+    ///
+    /// # Errors
+    /// [`BackendError::InputMismatch`] for a part that is empty, too large or
+    /// not aligned.
+    ///
+    /// # Safety
+    /// The buffer is of the backend's device, was made for these usages, has
+    /// the bytes, and lives as long as the result. Recordings that were given
+    /// it have left the GPU before it is destroyed.
+    pub unsafe fn adopt_buffer(&self, adopted: AdoptedBuffer) -> Result<AshBuffer, BackendError> {
+        let AdoptedBuffer {
+            buffer,
+            offset,
+            bytes,
+            usage,
+        } = adopted;
+        let limits = &self.device.physical.limits;
+        let alignment = limits.min_storage_buffer_offset_alignment.max(4);
+        let most = self.limits().max_buffer_bytes;
+        if bytes == 0
+            || bytes % 4 != 0
+            || bytes > most
+            || offset % alignment != 0
+            || offset.checked_add(bytes).is_none()
+        {
+            return Err(BackendError::InputMismatch {
+                name: format!("{buffer:?}"),
+                given: format!("{bytes} bytes at byte {offset}"),
+                wanted: format!("a multiple of 4 bytes up to {most}, at a multiple of {alignment}"),
+            });
+        }
+        Ok(AshBuffer {
+            buffer: Buffer::adopted(&self.device, buffer, offset, bytes, usage),
+            device: self.device.clone(),
+        })
+    }
+
+    /// Records a plan into an engine's command buffer.
+    ///
+    /// Histories advance with each recording, so every one is to be submitted,
+    /// in the order of recording and to the queue that was adopted. A plan with
+    /// captures is refused: there is nobody to wait for them.
+    ///
+    /// # Errors
+    /// Wrong bindings and plans that the device cannot run, before anything is
+    /// made or recorded. After any other error the command buffer may hold part
+    /// of the commands; it is to be discarded.
+    ///
+    /// # Safety
+    /// * The command buffer was allocated from the backend's device, for the
+    ///   adopted queue's family, and is in the recording state outside a render
+    ///   pass.
+    /// * Textures and buffers are in the states they are said to be in when
+    ///   the commands run.
+    /// * The conditions of [`AshBackend::adopt`] hold.
+    pub unsafe fn record(
+        &mut self,
+        command_buffer: vk::CommandBuffer,
+        plan: &Plan,
+        bindings: &AshBindings<'_>,
+    ) -> Result<AshOutputs, BackendError> {
+        if let Some(step) = plan
+            .steps
+            .iter()
+            .find(|step| matches!(step.step, Step::Capture { .. }))
+        {
+            return Err(unsupported(
+                &step.name,
+                "a host that waits for it (plan with `Capture::None` for an engine's frame)",
+            ));
+        }
+        let given = self.given(plan, bindings)?;
+        let prepared = self.prepare(plan)?;
+        let pairs = self.histories.get(&self.device, plan)?;
+        let resources =
+            self.resources(
+                plan,
+                prepared,
+                &pairs,
+                |prepared, device, index| match given.get(index).and_then(Option::as_ref) {
+                    Some(Given {
+                        resource: Some(resource),
+                        ..
+                    }) => Ok(resource.clone()),
+                    _ => prepared.output(device, index, &plan.resources[index]),
+                },
+            )?;
+        let recording = self.begin_engine_recording();
+        // SAFETY: this function's own conditions.
+        let commands = unsafe { Commands::new(&self.device, command_buffer) };
+        let prepared = &mut self.prepared[prepared].1;
+
+        let mut before = Barriers::default();
+        let mut after = Barriers::default();
+        let mut outputs = AshOutputs::default();
+        for (index, (resource, given)) in resources.iter().zip(&given).enumerate() {
+            let Some(given) = given else { continue };
+            engine::leave(&mut after, resource, given.returns);
+            let ResourceKind::Output(names) = &plan.resources[index].kind else {
+                engine::arrive(&mut before, resource, given.arrives);
+                continue;
+            };
+            if given.resource.is_some() {
+                engine::wait(&mut before, resource, given.arrives);
+            } else {
+                engine::wait(&mut before, resource, prepared.left[index]);
+                prepared.left[index] = given.returns;
+            }
+            outputs.add(names, resource, given.returns)?;
+        }
+        commands.begin_label("etalon");
+        commands.barrier(&mut before);
+        let result = run(
+            &self.device,
+            &commands,
+            prepared,
+            &self.shared,
+            plan,
+            &resources,
+            &pairs,
+            recording,
+            false,
+        );
+        commands.barrier(&mut after);
+        commands.end_label();
+        result?;
+        self.histories.advance(plan);
+        Ok(outputs)
+    }
+
+    /// What an engine gives for each resource of a plan; `None` for what it
+    /// does not give.
+    fn given(
+        &self,
+        plan: &Plan,
+        bindings: &AshBindings<'_>,
+    ) -> Result<Vec<Option<Given>>, BackendError> {
+        let mut given = Vec::with_capacity(plan.resources.len());
+        // Identities of what is written, and of all, with their names.
+        let mut written: Vec<u64> = Vec::new();
+        let mut all: Vec<(u64, &str)> = Vec::new();
+        for planned in &plan.resources {
+            let found = match &planned.kind {
+                ResourceKind::Import(name) => Some(bindings.import(&self.device, name, planned)?),
+                ResourceKind::Output(names) => {
+                    Some(bindings.output(&self.device, names, planned)?)
+                }
+                _ => None,
+            };
+            if let Some(resource) = found.as_ref().and_then(|found| found.resource.as_ref()) {
+                all.push((resource.id(), &planned.name));
+                if planned.usages.iter().any(etalon_core::plan::Usage::writes) {
+                    written.push(resource.id());
+                }
+            }
+            given.push(found);
+        }
+        for id in written {
+            let mut same = all.iter().filter(|(other, _)| *other == id);
+            if let (Some((_, first)), Some((_, second))) = (same.next(), same.next()) {
+                return Err(BackendError::InputMismatch {
+                    name: (*second).to_owned(),
+                    given: format!("what is also given as `{first}`"),
+                    wanted: "something else, since one of them is written".to_owned(),
+                });
+            }
+        }
+        Ok(given)
+    }
+
+    /// Begins a recording of an engine's, by which an older one is done.
+    fn begin_engine_recording(&mut self) -> u64 {
+        let recording = self.device.begin_recording();
+        self.under_way.push_back(recording);
+        let most = usize::try_from(self.options.frames_in_flight).unwrap_or(usize::MAX);
+        while self.under_way.len() > most {
+            if let Some(done) = self.under_way.pop_front() {
+                self.device.complete(done);
+            }
+        }
+        recording
+    }
+
+    /// Finds what was made for plans of this structure, or makes it. Returns
+    /// its index, which is good until the next call.
+    fn prepare(&mut self, plan: &Plan) -> Result<usize, BackendError> {
+        let structure = plan.structure();
+        let found = self
+            .prepared
+            .iter()
+            .position(|(candidate, _)| *candidate == structure);
+        let prepared = match found {
+            Some(index) => self.prepared.remove(index).1,
+            None => {
+                let frames = self.options.frames_in_flight;
+                let made = Prepared::new(&self.device, plan, &mut self.shared, frames)?;
+                if self.prepared.len() >= self.options.plans_kept {
+                    self.prepared.remove(0);
+                }
+                made
+            }
+        };
+        self.prepared.push((structure, prepared));
+        Ok(self.prepared.len() - 1)
+    }
+
+    /// The texture or buffer behind each number of a plan. `outside` finds
+    /// imports and outputs.
+    fn resources(
+        &mut self,
+        plan: &Plan,
+        prepared: usize,
+        pairs: &[Pair],
+        outside: impl Fn(&mut Prepared, &Arc<Device>, usize) -> Result<Resource, BackendError>,
+    ) -> Result<Vec<Resource>, BackendError> {
+        let device = self.device.clone();
+        let prepared = &mut self.prepared[prepared].1;
+        let of_history = |history: u32, previous: bool| {
+            let pair = pairs.get(usize::try_from(history).ok()?)?;
+            let image = if previous {
+                &pair.previous
+            } else {
+                &pair.current
+            };
+            Some(Resource::Texture(image.clone()))
+        };
+        let mut resources = Vec::with_capacity(plan.resources.len());
+        for (index, planned) in plan.resources.iter().enumerate() {
+            let found = match planned.kind {
+                ResourceKind::Import(_) | ResourceKind::Output(_) => {
+                    Some(outside(prepared, &device, index)?)
+                }
+                ResourceKind::HistoryPrevious(history) => of_history(history, true),
+                ResourceKind::HistoryCurrent(history) => of_history(history, false),
+                ResourceKind::Transient(_) => {
+                    prepared.heaps.transients.get(index).cloned().flatten()
+                }
+            };
+            // The plan was checked, so there is one.
+            resources.push(
+                found.ok_or_else(|| {
+                    malformed(format!("there is nothing behind `{}`", planned.name))
+                })?,
+            );
+        }
+        Ok(resources)
+    }
+
+    /// Runs a plan with inputs from the host, which have been checked.
+    fn execute_checked(
+        &mut self,
+        plan: &Plan,
+        inputs: &Inputs<'_>,
+    ) -> Result<Execution, BackendError> {
+        let prepared = self.prepare(plan)?;
+        if self.host.is_none() {
+            self.host = Some(HostQueue::new(&self.device)?);
+        }
+        if self.prepared[prepared].1.host.is_none() {
+            self.prepared[prepared].1.host = Some(HostSide::new(&self.device, plan)?);
+        }
+        let pairs = self.histories.get(&self.device, plan)?;
+        let resources = self.resources(plan, prepared, &pairs, |prepared, device, index| {
+            let import = prepared.host.as_ref().and_then(|host| host.import(index));
+            match import {
+                Some(import) => Ok(import.clone()),
+                None => prepared.output(device, index, &plan.resources[index]),
+            }
+        })?;
+        let Some(queue) = &self.host else {
+            return Err(malformed("there is no queue"));
+        };
+        let prepared = &mut self.prepared[prepared].1;
+        if let Some(host) = &prepared.host {
+            host.stage(plan, inputs)?;
+        }
+        let recording = self.device.begin_recording();
+        let result = (|| {
+            let commands = queue.begin()?;
+            let mut before = Barriers::default();
+            for (index, resource) in resources.iter().enumerate() {
+                // An engine may have left outputs elsewhere.
+                engine::wait(&mut before, resource, prepared.left[index]);
+            }
+            commands.barrier(&mut before);
+            if let Some(host) = &prepared.host {
+                host.upload(&commands);
+            }
+            run(
+                &self.device,
+                &commands,
+                prepared,
+                &self.shared,
+                plan,
+                &resources,
+                &pairs,
+                recording,
+                true,
+            )?;
+            if let Some(host) = &prepared.host {
+                host.show(&commands);
+            }
+            queue.submit()
+        })();
+        // Submitted and waited for, or never submitted.
+        prepared.release(recording);
+        if self.under_way.is_empty() {
+            self.device.complete(recording);
+        }
+        result?;
+        prepared.left.fill(TextureState::REST);
+        self.histories.advance(plan);
+        match &prepared.host {
+            Some(host) => host.collect(plan),
+            None => Ok(Execution::default()),
+        }
+    }
+}
+
+/// Records the plan itself, between what comes before and after.
+#[expect(
+    clippy::too_many_arguments,
+    reason = "both callers borrow them from one struct, each separately"
+)]
+fn run(
+    device: &Arc<Device>,
+    commands: &Commands<'_>,
+    prepared: &mut Prepared,
+    shared: &Shared,
+    plan: &Plan,
+    resources: &[Resource],
+    pairs: &[Pair],
+    recording: u64,
+    for_host: bool,
+) -> Result<(), BackendError> {
+    let (uniforms, ring) = match &mut prepared.uniforms {
+        Some(ring) => (
+            ring.write(&plan.uniforms, recording, device.completed())?,
+            Some(ring.raw()),
+        ),
+        None => (0, None),
+    };
+    let parts = Parts {
+        plan,
+        pipelines: &prepared.pipelines,
+        resources,
+        samplers: &shared.samplers,
+        uniforms: ring,
+    };
+    let sets = prepared.bindings.get(device, &parts, recording)?;
+    history::initialise(commands, pairs);
+    let host = prepared.host.as_ref().filter(|_| for_host);
+    Run {
+        plan,
+        resources,
+        apart: &prepared.heaps.apart,
+        pipelines: &prepared.pipelines,
+        sets,
+        uniforms,
+        captures: host.and_then(HostSide::captures),
+        queries: host.and_then(|host| host.queries(commands)),
+    }
+    .record(commands)
+}
+
+impl Backend for AshBackend {
+    fn info(&self) -> BackendInfo {
+        let info = &self.device.physical.info;
+        BackendInfo {
+            backend: NAME,
+            api: format!("Vulkan {}", info.api_version),
+            device: info.name.clone(),
+            driver: info.driver.clone(),
+        }
+    }
+
+    fn limits(&self) -> Limits {
+        self.device.physical.limits(&self.device.features)
+    }
+
+    fn memory(&self) -> &dyn MemoryModel {
+        &self.memory
+    }
+
+    fn execute(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
+        host::check_inputs(plan, inputs)?;
+        let log = self
+            .validation_log()
+            .filter(|_| self.options.validation_fails);
+        let before = log.as_ref().map_or(0, |log| log.len());
+        let result = self.execute_checked(plan, inputs);
+        if let Some(log) = log {
+            let messages: Vec<String> = log
+                .messages()
+                .iter()
+                .skip(before)
+                .map(ToString::to_string)
+                .collect();
+            if !messages.is_empty() {
+                return Err(BackendError::Validation { messages });
+            }
+        }
+        result
+    }
+
+    fn reset_histories(&mut self) {
+        self.histories.clear();
+    }
+
+    fn counters(&self) -> Counters {
+        self.device.tally.read()
+    }
+}

@@ -1,0 +1,259 @@
+//! Recording a plan: its steps in order, its barriers as they stand.
+
+use std::sync::Arc;
+
+use ash::vk;
+use etalon_core::backend::BackendError;
+use etalon_core::plan::{Barrier, Bound, Groups, Plan, Step};
+
+use crate::buffer::Buffer;
+use crate::commands::{Barriers, Commands, Transition};
+use crate::device::count;
+use crate::error::malformed;
+use crate::image::Image;
+use crate::pipeline::Pipeline;
+use crate::texels::Texels;
+use crate::{Resource, usage};
+
+/// Where the bytes of one capture go.
+#[derive(Debug)]
+pub(crate) enum Place {
+    /// Part of a texture.
+    Texture(Texels),
+    /// A whole buffer.
+    Buffer {
+        /// First byte.
+        offset: u64,
+        /// Number of bytes.
+        bytes: u64,
+    },
+}
+
+/// Where captures go: a host-visible buffer, and a place in it for each of the
+/// plan's captures in order.
+pub(crate) struct Captures<'a> {
+    pub(crate) buffer: &'a Buffer,
+    pub(crate) places: &'a [Place],
+}
+
+/// Everything a recording of a plan needs, made and bound.
+pub(crate) struct Run<'a> {
+    pub(crate) plan: &'a Plan,
+    /// By number in the plan.
+    pub(crate) resources: &'a [Resource],
+    /// By number in the plan: transients with memory of their own.
+    pub(crate) apart: &'a [bool],
+    /// By step.
+    pub(crate) pipelines: &'a [Option<Arc<Pipeline>>],
+    /// By step.
+    pub(crate) sets: &'a [vk::DescriptorSet],
+    /// Where this run's uniform blocks begin in their ring.
+    pub(crate) uniforms: u32,
+    pub(crate) captures: Option<Captures<'a>>,
+    /// Two queries for each step that is not a capture.
+    pub(crate) queries: Option<vk::QueryPool>,
+}
+
+impl Run<'_> {
+    /// Records the plan.
+    pub(crate) fn record(&self, commands: &Commands<'_>) -> Result<(), BackendError> {
+        let mut barriers = Barriers::default();
+        let mut captured = 0;
+        let mut timed = 0;
+        for (index, step) in self.plan.steps.iter().enumerate() {
+            commands.begin_label(&step.name);
+            self.barriers(commands, &step.barriers, &mut barriers)?;
+            let result = if let Step::Capture { resource, .. } = &step.step {
+                captured += 1;
+                self.capture(commands, *resource, captured - 1)
+            } else {
+                self.timed(commands, &mut timed, || {
+                    self.work(commands, index, &step.step)
+                })
+            };
+            commands.end_label();
+            result?;
+        }
+        self.barriers(commands, &self.plan.final_barriers, &mut barriers)
+    }
+
+    /// Takes the time before and after.
+    fn timed(
+        &self,
+        commands: &Commands<'_>,
+        query: &mut u32,
+        work: impl FnOnce() -> Result<(), BackendError>,
+    ) -> Result<(), BackendError> {
+        let Some(pool) = self.queries else {
+            return work();
+        };
+        commands.timestamp(pool, *query);
+        let result = work();
+        commands.timestamp(pool, *query + 1);
+        *query += 2;
+        result
+    }
+
+    fn get(&self, resource: u32) -> Result<&Resource, BackendError> {
+        // The plan was checked, so this does not fail.
+        usize::try_from(resource)
+            .ok()
+            .and_then(|index| self.resources.get(index))
+            .ok_or_else(|| malformed(format!("there is no resource {resource}")))
+    }
+
+    fn image(&self, resource: u32) -> Result<&Image, BackendError> {
+        match self.get(resource)? {
+            Resource::Texture(image) => Ok(image),
+            Resource::Buffer(_) => Err(malformed(format!("resource {resource} is a buffer"))),
+        }
+    }
+
+    fn buffer(&self, resource: u32) -> Result<&Buffer, BackendError> {
+        match self.get(resource)? {
+            Resource::Buffer(buffer) => Ok(buffer),
+            Resource::Texture(_) => Err(malformed(format!("resource {resource} is a texture"))),
+        }
+    }
+
+    /// Records a step's barriers in one call.
+    fn barriers(
+        &self,
+        commands: &Commands<'_>,
+        planned: &[Barrier],
+        barriers: &mut Barriers,
+    ) -> Result<(), BackendError> {
+        for barrier in planned {
+            let by = self.transition(barrier);
+            match self.get(barrier.resource)? {
+                Resource::Texture(image) => barriers.image(image, barrier.range, by),
+                Resource::Buffer(buffer) => barriers.buffer(buffer, by),
+            }
+        }
+        count(
+            &commands.device.tally.barriers,
+            u64::try_from(planned.len()).unwrap_or(u64::MAX),
+        );
+        commands.barrier(barriers);
+        Ok(())
+    }
+
+    fn transition(&self, barrier: &Barrier) -> Transition {
+        let mut from = barrier.from;
+        let index = usize::try_from(barrier.resource).unwrap_or(usize::MAX);
+        // The first use of a transient: the plan names the uses of those that
+        // had its memory before. One with memory of its own had it before
+        // itself, in the run before. (An empty set waits for everything.)
+        if barrier.layout.is_none()
+            && !from.is_empty()
+            && self.apart.get(index).is_some_and(|apart| *apart)
+            && let Some(resource) = self.plan.resources.get(index)
+        {
+            from = from.union(resource.usages);
+        }
+        let to = usage::row(barrier.to);
+        Transition {
+            source: usage::source(from),
+            target: (to.stages, to.access),
+            layouts: (
+                barrier.layout.map_or(vk::ImageLayout::UNDEFINED, |layout| {
+                    usage::row(layout).layout
+                }),
+                to.layout,
+            ),
+        }
+    }
+
+    /// Does what a step does.
+    fn work(&self, commands: &Commands<'_>, index: usize, step: &Step) -> Result<(), BackendError> {
+        match step {
+            Step::Dispatch {
+                bindings, groups, ..
+            } => self.dispatch(commands, index, bindings, groups),
+            Step::ClearTexture {
+                resource,
+                range,
+                value,
+            } => {
+                commands.clear_image(self.image(*resource)?, *range, *value);
+                Ok(())
+            }
+            Step::ClearBuffer { resource } => {
+                commands.clear_buffer(self.buffer(*resource)?);
+                Ok(())
+            }
+            Step::CopyTexture { source, target } => {
+                commands.copy_image(
+                    (self.image(source.0)?, source.1),
+                    (self.image(target.0)?, target.1),
+                );
+                Ok(())
+            }
+            Step::CopyBuffer { source, target } => {
+                let source = self.buffer(*source)?;
+                commands.copy_buffer((source, 0), (self.buffer(*target)?, 0), source.bytes);
+                Ok(())
+            }
+            // Captures are told apart before.
+            Step::Capture { .. } => Ok(()),
+        }
+    }
+
+    fn dispatch(
+        &self,
+        commands: &Commands<'_>,
+        index: usize,
+        bindings: &[Bound],
+        groups: &Groups,
+    ) -> Result<(), BackendError> {
+        if matches!(groups, Groups::Direct(counts) if counts.contains(&0)) {
+            return Ok(());
+        }
+        let (Some(Some(pipeline)), Some(set)) = (self.pipelines.get(index), self.sets.get(index))
+        else {
+            // Every dispatch was given both when the plan was prepared.
+            return Err(malformed(format!("step {index} was not prepared")));
+        };
+        // In order of binding number, as the kernel's bindings are.
+        let offsets: Vec<u32> = bindings
+            .iter()
+            .filter_map(|bound| match bound {
+                Bound::Uniform(slice) => Some(self.uniforms + slice.offset),
+                _ => None,
+            })
+            .collect();
+        commands.bind(pipeline, *set, &offsets);
+        match groups {
+            Groups::Direct(counts) => commands.dispatch(*counts),
+            Groups::Indirect { buffer, offset } => {
+                commands.dispatch_indirect(self.buffer(*buffer)?, *offset);
+            }
+        }
+        count(&commands.device.tally.dispatches, 1);
+        Ok(())
+    }
+
+    fn capture(
+        &self,
+        commands: &Commands<'_>,
+        resource: u32,
+        index: usize,
+    ) -> Result<(), BackendError> {
+        let place = self
+            .captures
+            .as_ref()
+            .and_then(|captures| Some((captures.buffer, captures.places.get(index)?)));
+        match (place, self.get(resource)?) {
+            (Some((target, Place::Texture(texels))), Resource::Texture(image)) => {
+                commands.download(image, target, &texels.regions);
+                Ok(())
+            }
+            (Some((target, Place::Buffer { offset, bytes })), Resource::Buffer(source)) => {
+                commands.copy_buffer((source, 0), (target, *offset), *bytes);
+                Ok(())
+            }
+            // Each capture was given a place when the plan was prepared.
+            _ => Err(malformed(format!("capture {index} has no place to go"))),
+        }
+    }
+}

@@ -250,6 +250,7 @@ fn short_name(manifest: &Path) -> String {
         "lvp" => "lavapipe",
         "radeon" => "radv",
         "intel" => "anv",
+        "intel_hasvk" => "hasvk",
         "nouveau" => "nvk",
         other => other,
     }

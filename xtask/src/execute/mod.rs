@@ -11,7 +11,7 @@ pub mod plant;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use etalon::effects::effect;
+use etalon::effects::{EffectEntry, effect, effects};
 use etalon_core::backend::{BackendError, CapturedData};
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture as CaptureWhat, Plan, PlanError, PlanOptions};
@@ -165,13 +165,8 @@ pub enum ExecuteError {
     #[error(transparent)]
     Source(#[from] SourceError),
     /// No effect of that name.
-    #[error("there is no effect `{name}`; there are {}", known.join(", "))]
-    NoEffect {
-        /// As given.
-        name: String,
-        /// As there are.
-        known: Vec<&'static str>,
-    },
+    #[error(transparent)]
+    Effect(#[from] UnknownEffect),
     /// The graph cannot be planned.
     #[error(transparent)]
     Plan(#[from] PlanError),
@@ -194,6 +189,23 @@ pub enum ExecuteError {
     /// The outcome cannot be written.
     #[error(transparent)]
     Outcome(#[from] OutcomeError),
+}
+
+/// No effect of that name.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("there is no effect `{name}`; there are {}", effects().iter().map(|effect| effect.name).collect::<Vec<_>>().join(", "))]
+pub struct UnknownEffect {
+    name: String,
+}
+
+/// The effect of a name.
+///
+/// # Errors
+/// If there is none.
+pub fn find_effect(name: &str) -> Result<&'static EffectEntry, UnknownEffect> {
+    effect(name).ok_or_else(|| UnknownEffect {
+        name: name.to_owned(),
+    })
 }
 
 /// Runs the job and writes its outcome, whatever that is, to the folder.
@@ -224,13 +236,7 @@ pub fn run(job: &Job) -> Result<(), OutcomeError> {
 }
 
 fn execute(job: &Job) -> Result<Run, ExecuteError> {
-    let effect = effect(&job.effect).ok_or_else(|| ExecuteError::NoEffect {
-        name: job.effect.clone(),
-        known: etalon::effects::effects()
-            .iter()
-            .map(|effect| effect.name)
-            .collect(),
-    })?;
+    let effect = find_effect(&job.effect)?;
     // The device first: without one there is no need to render anything.
     let mut backend = open(job)?;
     let frame = job.source().frame()?;

@@ -151,45 +151,24 @@ pub fn conclude(report: &mut Report) {
         let Some(reason) = run.status.reason() else {
             continue;
         };
-        let line = format!(
-            "{} {} ({}): {reason}",
-            run.executor,
-            run.status.word(),
-            run.case
-        );
+        let line = match run.status {
+            // The same in every case.
+            Status::NoDevice { .. } => format!("{}: {reason}", run.executor),
+            _ => format!(
+                "{} {} ({}): {reason}",
+                run.executor,
+                run.status.word(),
+                run.case
+            ),
+        };
         if run.status.is_fault() && backend_of(&run.executor).is_some_and(required) {
             problems.push(line);
-        } else {
+        } else if !notes.contains(&line) {
             notes.push(line);
         }
     }
     for &backend in &report.settings.required {
-        for case in report.cases() {
-            let ran = report.runs.iter().any(|run| {
-                run.case == *case
-                    && backend_of(&run.executor) == Some(backend)
-                    && matches!(run.status, Status::Ran { .. })
-            });
-            let compared = backend == BackendKind::Cpu
-                || report
-                    .comparisons_of(case)
-                    .any(|comparison| comparison.backend == backend);
-            if !ran {
-                problems.push(match backend {
-                    BackendKind::Cpu => format!(
-                        "cpu did not run ({case}), and it is what the others are compared with"
-                    ),
-                    _ => format!(
-                        "{backend} ran on no driver ({case}); to install drivers: {}",
-                        setup::hint()
-                    ),
-                });
-            } else if !compared {
-                problems.push(format!(
-                    "{backend} ran, but nothing of it could be compared ({case})"
-                ));
-            }
-        }
+        problems.extend(missing(report, backend));
     }
     if report.runs.is_empty() {
         problems.push("nothing ran".to_owned());
@@ -208,6 +187,53 @@ pub fn conclude(report: &mut Report) {
     report.ok = problems.is_empty();
     report.problems = problems;
     report.notes = notes;
+}
+
+/// What is missing of a required backend.
+fn missing(report: &Report, backend: BackendKind) -> Vec<String> {
+    let of_backend = |id: &str| {
+        report
+            .executors
+            .iter()
+            .any(|executor| executor.id == id && executor.backend == backend)
+    };
+    let ran = |case: &Case| {
+        report.runs.iter().any(|run| {
+            run.case == *case
+                && of_backend(&run.executor)
+                && matches!(run.status, Status::Ran { .. })
+        })
+    };
+    let compared = |case: &Case| {
+        backend == BackendKind::Cpu
+            || report
+                .comparisons_of(case)
+                .any(|comparison| comparison.backend == backend)
+    };
+    let cases = report.cases();
+    if !cases.iter().any(|case| ran(case)) {
+        return vec![match backend {
+            BackendKind::Cpu => {
+                "cpu did not run, and it is what the others are compared with".to_owned()
+            }
+            _ => format!(
+                "{backend} ran on no driver; to install drivers: {}",
+                setup::hint()
+            ),
+        }];
+    }
+    let line = |case: &&Case| {
+        if !ran(case) {
+            Some(format!("{backend} did not run ({case})"))
+        } else if !compared(case) {
+            Some(format!(
+                "{backend} ran, but nothing of it could be compared ({case})"
+            ))
+        } else {
+            None
+        }
+    };
+    cases.iter().filter_map(line).collect()
 }
 
 /// One line for each pair that disagrees in a case, naming the first pass in

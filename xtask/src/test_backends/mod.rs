@@ -21,14 +21,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
 use crate::drivers::{self, Driver};
-use crate::execute::Api;
-use crate::execute::Job;
 use crate::execute::frame::{Source, SourceError};
 use crate::execute::outcome::Run;
+use crate::execute::{ArithmeticName, UnknownEffect, find_effect};
 use crate::setup::{self, SetupError};
 use evaluate::{EvaluateError, Finished};
 use gallery::{Gallery, GalleryError};
-use model::{BackendKind, Case, Executor, Report, RunReport, Settings, Target};
+use model::{BackendKind, Case, Executor, Report, RunReport, Settings, Status, Target};
 pub use options::Options;
 pub use supervise::COMMAND;
 
@@ -55,6 +54,9 @@ pub enum TestError {
         /// As there are.
         found: Vec<String>,
     },
+    /// An effect that is not there.
+    #[error(transparent)]
+    Effect(#[from] UnknownEffect),
     /// A frame that cannot be had.
     #[error(transparent)]
     Source(#[from] SourceError),
@@ -79,11 +81,124 @@ pub enum TestError {
 /// # Errors
 /// If no report could be made; disagreement is in the report.
 pub fn run(options: &Options, program: &Path) -> Result<Report, TestError> {
+    find_effect(&options.effect)?;
+    let sources = sources(options)?;
     if options.setup {
         setup::run()?;
     }
     let found = drivers::find(&drivers::Environment::of_process());
     let executors = executors(&choose(&found.drivers, &options.drivers)?);
+    check_planted(options, &executors)?;
+    let cases = sources.len() * options.arithmetic.names().len();
+    let mut bench = Bench {
+        options,
+        program,
+        gallery: options.report.as_deref().map(Gallery::new).transpose()?,
+        progress: progress(cases * executors.len()),
+        report: Report {
+            ok: false,
+            problems: Vec::new(),
+            notes: Vec::new(),
+            settings: settings(options, &sources)?,
+            executors,
+            unusable_manifests: found.bad,
+            runs: Vec::new(),
+            comparisons: Vec::new(),
+        },
+    };
+    for source in &sources {
+        for &arithmetic in options.arithmetic.names() {
+            bench.run_case(source, arithmetic)?;
+        }
+    }
+    bench.progress.finish_and_clear();
+    let mut report = bench.report;
+    evaluate::conclude(&mut report);
+    write(&report, options)?;
+    Ok(report)
+}
+
+/// A command under way.
+struct Bench<'a> {
+    options: &'a Options,
+    program: &'a Path,
+    gallery: Option<Gallery>,
+    progress: ProgressBar,
+    report: Report,
+}
+
+impl Bench<'_> {
+    /// Runs a frame in one arithmetic on every executor, compares, and forgets
+    /// the texels.
+    fn run_case(&mut self, source: &Source, arithmetic: ArithmeticName) -> Result<(), TestError> {
+        let case = Case {
+            scene: source.name(),
+            arithmetic: arithmetic.name().to_owned(),
+        };
+        let work = tempfile::tempdir().map_err(|source| TestError::Io {
+            path: std::env::temp_dir(),
+            source,
+        })?;
+        let mut done: Vec<(Executor, Run, PathBuf)> = Vec::new();
+        for (number, executor) in self.report.executors.clone().into_iter().enumerate() {
+            self.progress
+                .set_message(format!("{case}: {}", executor.id));
+            let folder = work.path().join(number.to_string());
+            let (status, run) = match self.absent(&executor) {
+                Some(status) => (status, None),
+                None => {
+                    std::fs::create_dir(&folder).map_err(|source| TestError::Io {
+                        path: folder.clone(),
+                        source,
+                    })?;
+                    let job = self
+                        .options
+                        .job(source, arithmetic, &executor, folder.clone());
+                    let limit = Duration::from_secs(self.options.timeout);
+                    supervise::run(self.program, &job, &executor.target, limit)
+                }
+            };
+            self.report.runs.push(RunReport {
+                case: case.clone(),
+                executor: executor.id.clone(),
+                status,
+            });
+            done.extend(run.map(|run| (executor, run, folder)));
+            self.progress.inc(1);
+        }
+        self.progress.set_message(format!("{case}: comparing"));
+        let finished: Vec<Finished<'_>> = done
+            .iter()
+            .map(|(executor, run, folder)| Finished {
+                executor,
+                run,
+                folder,
+            })
+            .collect();
+        for pair in evaluate::pairs(&finished) {
+            let tolerance = tolerances::of(&case, pair);
+            let compared = evaluate::compare_pair(&case, pair, tolerance, self.gallery.as_mut())?;
+            self.report.comparisons.extend(compared);
+        }
+        Ok(())
+    }
+
+    /// The status of an executor that had no device in an earlier case: it has
+    /// none in the next either.
+    fn absent(&self, executor: &Executor) -> Option<Status> {
+        let is_absent = |run: &&RunReport| {
+            run.executor == executor.id && matches!(run.status, Status::NoDevice { .. })
+        };
+        self.report
+            .runs
+            .iter()
+            .find(is_absent)
+            .map(|run| run.status.clone())
+    }
+}
+
+/// Whether the faults to plant are for executors that are there.
+fn check_planted(options: &Options, executors: &[Executor]) -> Result<(), TestError> {
     for (name, _) in &options.plant {
         if executors.iter().all(|executor| executor.id != *name) {
             let found = executors
@@ -95,123 +210,6 @@ pub fn run(options: &Options, program: &Path) -> Result<Report, TestError> {
                 found,
             });
         }
-    }
-    let sources = sources(options)?;
-    let mut gallery = options.report.as_deref().map(Gallery::new).transpose()?;
-    let mut report = Report {
-        ok: false,
-        problems: Vec::new(),
-        notes: Vec::new(),
-        settings: settings(options, &sources)?,
-        executors,
-        unusable_manifests: found.bad,
-        runs: Vec::new(),
-        comparisons: Vec::new(),
-    };
-    let progress =
-        progress(sources.len() * options.arithmetic.names().len() * report.executors.len());
-    for source in &sources {
-        for &arithmetic in options.arithmetic.names() {
-            let case = Case {
-                scene: source.name(),
-                arithmetic: arithmetic.name().to_owned(),
-            };
-            let job = |executor: &Executor, out: PathBuf| Job {
-                backend: executor.backend,
-                api: if executor.target == Target::Gl {
-                    Api::Gl
-                } else {
-                    Api::Vulkan
-                },
-                scene: if let Source::Scene { name, .. } = source {
-                    Some(name.clone())
-                } else {
-                    None
-                },
-                input: if let Source::File(path) = source {
-                    Some(path.clone())
-                } else {
-                    None
-                },
-                size: options.size,
-                effect: options.effect.clone(),
-                arithmetic,
-                frames: options.frames,
-                threads: options.threads,
-                plant: options
-                    .plant
-                    .iter()
-                    .find(|(name, _)| *name == executor.id)
-                    .map(|(_, fault)| fault.clone()),
-                out,
-            };
-            run_case(
-                &mut report,
-                &case,
-                job,
-                program,
-                options,
-                gallery.as_mut(),
-                &progress,
-            )?;
-        }
-    }
-    progress.finish_and_clear();
-    evaluate::conclude(&mut report);
-    write(&report, options)?;
-    Ok(report)
-}
-
-/// Runs one case on every executor, compares, and forgets the texels.
-fn run_case(
-    report: &mut Report,
-    case: &Case,
-    job: impl Fn(&Executor, PathBuf) -> Job,
-    program: &Path,
-    options: &Options,
-    mut gallery: Option<&mut Gallery>,
-    progress: &ProgressBar,
-) -> Result<(), TestError> {
-    let work = tempfile::tempdir().map_err(|source| TestError::Io {
-        path: std::env::temp_dir(),
-        source,
-    })?;
-    let mut done: Vec<(Executor, Run, PathBuf)> = Vec::new();
-    for (number, executor) in report.executors.iter().enumerate() {
-        progress.set_message(format!("{case}: {}", executor.id));
-        let folder = work.path().join(number.to_string());
-        std::fs::create_dir(&folder).map_err(|source| TestError::Io {
-            path: folder.clone(),
-            source,
-        })?;
-        let job = job(executor, folder.clone());
-        let limit = Duration::from_secs(options.timeout);
-        let (status, run) = supervise::run(program, &job, &executor.target, limit);
-        report.runs.push(RunReport {
-            case: case.clone(),
-            executor: executor.id.clone(),
-            status,
-        });
-        done.extend(run.map(|run| (executor.clone(), run, folder)));
-        progress.inc(1);
-    }
-    progress.set_message(format!("{case}: comparing"));
-    let finished: Vec<Finished<'_>> = done
-        .iter()
-        .map(|(executor, run, folder)| Finished {
-            executor,
-            run,
-            folder,
-        })
-        .collect();
-    for pair in evaluate::pairs(&finished) {
-        let tolerance = tolerances::of(case, pair);
-        report.comparisons.extend(evaluate::compare_pair(
-            case,
-            pair,
-            tolerance,
-            gallery.as_deref_mut(),
-        )?);
     }
     Ok(())
 }

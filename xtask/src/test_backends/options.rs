@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 
-use super::model::BackendKind;
-use crate::execute::ArithmeticName;
+use super::model::{BackendKind, Executor, Target};
+use crate::execute::frame::Source;
 use crate::execute::plant::Fault;
+use crate::execute::{Api, ArithmeticName, Job};
 use crate::size::Size;
 
 /// Which arithmetic to test.
@@ -95,6 +96,40 @@ pub struct Options {
     /// to see it found
     #[arg(long, value_name = "EXECUTOR=FAULT", hide = true, value_parser = planted)]
     pub plant: Vec<(String, Fault)>,
+}
+
+impl Options {
+    /// The job that runs a frame in one arithmetic on one executor.
+    pub(super) fn job(
+        &self,
+        source: &Source,
+        arithmetic: ArithmeticName,
+        executor: &Executor,
+        out: PathBuf,
+    ) -> Job {
+        let (scene, input) = match source {
+            Source::Scene { name, .. } => (Some(name.clone()), None),
+            Source::File(path) => (None, Some(path.clone())),
+        };
+        let planted = self.plant.iter().find(|(name, _)| *name == executor.id);
+        Job {
+            backend: executor.backend,
+            api: if executor.target == Target::Gl {
+                Api::Gl
+            } else {
+                Api::Vulkan
+            },
+            scene,
+            input,
+            size: self.size,
+            effect: self.effect.clone(),
+            arithmetic,
+            frames: self.frames,
+            threads: self.threads,
+            plant: planted.map(|(_, fault)| fault.clone()),
+            out,
+        }
+    }
 }
 
 /// Reads `EXECUTOR=FAULT`.

@@ -93,6 +93,10 @@ fn passes(text: &mut String, report: &Report, case: &Case) {
         })
         .map(|(number, executor)| (number, executor.id.as_str()))
         .collect();
+    if ran.is_empty() {
+        text.push_str("  nothing ran\n");
+        return;
+    }
     let mut header: Vec<String> = ["pass", "output", "shape"].map(str::to_owned).to_vec();
     header.extend(ran.iter().map(|(number, _)| format!("ms [{}]", number + 1)));
     header.extend(["max ULP", "mean ULP", "differing", "FLIP", "tolerance"].map(str::to_owned));

@@ -1,1 +1,65 @@
-//! .
+//! Runs plans of [`etalon_core`] through wgpu.
+//!
+//! [`WgpuBackend`] can be used in two ways:
+//!
+//! * An **engine** hands over its own device with [`WgpuBackend::adopt`] and
+//!   records plans into its own command encoder with [`WgpuBackend::record`],
+//!   giving its own textures and buffers by import name and, if it likes, its
+//!   own textures to write outputs into. See [`WgpuBindings`].
+//! * **Tests, tools and offline users** let it open a device of its own with
+//!   [`WgpuBackend::new`] and use it through
+//!   [`Backend`](etalon_core::backend::Backend).
+//!
+//! # What is kept between frames
+//! Pipelines are kept by kernel. Everything else a plan needs (transient
+//! textures by [slot](etalon_core::plan::Placement::slot), uniform buffers,
+//! bind groups) is kept by [`Plan::structure`](etalon_core::plan::Plan::structure)
+//! for the [`PREPARED_PLANS`] most recent plans. A frame whose structure was
+//! run before, with the same engine textures, creates no pipeline, bind group,
+//! texture, buffer or view; [`counters`](etalon_core::backend::Backend::counters)
+//! tells.
+//!
+//! # Arithmetic
+//! Strict kernels give the same bits everywhere only if the driver is told not
+//! to contract `a * b + c`. wgpu's own translation cannot say so; SPIR-V handed
+//! through untouched can. Where the device has
+//! [`PASSTHROUGH_SHADERS`](wgpu::Features::PASSTHROUGH_SHADERS) on Vulkan, the
+//! very words that the Vulkan backend of Etalon runs are used, see
+//! [`WgpuBackend::keeps_strict_arithmetic`].
+//!
+//! # Errors
+//! What a device cannot do is a [`BackendError`](etalon_core::backend::BackendError)
+//! that names the step, before wgpu sees it wherever it can be known; what wgpu
+//! still refuses is caught in error scopes. No wgpu error reaches the default
+//! handler, which panics. Messages of the Vulkan validation layer, if asked
+//! for, go to the `log` crate, where wgpu puts them.
+
+// One call needs `unsafe`: handing SPIR-V through to the driver, see `spirv`.
+#![deny(unsafe_code)]
+
+mod backend;
+mod bind;
+mod bindings;
+mod check;
+mod clear;
+mod convert;
+mod depth;
+mod fault;
+mod gpu;
+mod history;
+mod open;
+mod pipeline;
+mod prepare;
+mod readback;
+mod record;
+mod spirv;
+mod staging;
+mod tally;
+mod timing;
+mod upload;
+
+pub use backend::{PREPARED_PLANS, WgpuBackend};
+pub use bind::BIND_GROUPS_PER_STEP;
+pub use bindings::{WgpuBindings, WgpuOutput, WgpuOutputs};
+pub use open::{WgpuOptions, enumerate};
+pub use wgpu;

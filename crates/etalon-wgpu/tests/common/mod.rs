@@ -1,0 +1,183 @@
+//! Devices, kernels and images that the tests share.
+
+#![allow(dead_code, reason = "each test file uses some of it")]
+
+use etalon_core::Format;
+use etalon_core::backend::{Backend, BackendError, Execution, Inputs};
+use etalon_core::format::SampleKind;
+use etalon_core::graph::Graph;
+use etalon_core::image::ImageData;
+use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::plan::{Capture, Plan, PlanOptions};
+use etalon_core::resource::TextureDesc;
+use etalon_wgpu::{WgpuBackend, WgpuOptions, wgpu};
+
+/// A way from a plan to a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Route {
+    /// Vulkan, with SPIR-V handed through.
+    Vulkan,
+    /// Vulkan, with kernels translated by wgpu.
+    Translated,
+    /// OpenGL.
+    Gl,
+}
+
+pub const ROUTES: [Route; 3] = [Route::Vulkan, Route::Translated, Route::Gl];
+
+impl Route {
+    pub fn options(self) -> WgpuOptions {
+        WgpuOptions {
+            backends: match self {
+                Self::Gl => wgpu::Backends::GL,
+                Self::Vulkan | Self::Translated => wgpu::Backends::VULKAN,
+            },
+            passthrough: self == Self::Vulkan,
+            validation: true,
+            ..WgpuOptions::default()
+        }
+    }
+}
+
+/// Whether a missing driver is a failure.
+fn required() -> bool {
+    std::env::var("ETALON_REQUIRE")
+        .is_ok_and(|list| list.split(',').any(|name| name.trim() == "wgpu"))
+}
+
+/// Opens a device, or says why there is none.
+pub fn open(route: Route) -> Option<WgpuBackend> {
+    match WgpuBackend::new(&route.options()) {
+        Ok(backend) => Some(backend),
+        Err(error @ BackendError::NoDevice { .. }) => {
+            // OpenGL is extra: CI requires one Vulkan driver.
+            assert!(!required() || route == Route::Gl, "{route:?}: {error}");
+            println!("skipped on {route:?}: {error}");
+            None
+        }
+        Err(error) => panic!("{route:?}: {error}"),
+    }
+}
+
+/// Runs a test on Vulkan, both ways.
+pub fn on_vulkan(test: impl Fn(&mut WgpuBackend)) {
+    for route in [Route::Vulkan, Route::Translated] {
+        if let Some(mut backend) = open(route) {
+            println!("{route:?}: {}", backend.info());
+            test(&mut backend);
+        }
+    }
+}
+
+/// Runs a test on every route.
+pub fn everywhere(test: impl Fn(Route, &mut WgpuBackend)) {
+    for route in ROUTES {
+        if let Some(mut backend) = open(route) {
+            println!("{route:?}: {}", backend.info());
+            test(route, &mut backend);
+        }
+    }
+}
+
+/// A strict plan of everything the graph asks for.
+pub fn plan(
+    backend: &WgpuBackend,
+    graph: &Graph,
+    library: &KernelLibrary,
+    capture: Capture,
+) -> Plan {
+    let options = PlanOptions {
+        arithmetic: Arithmetic::Strict,
+        limits: backend.limits(),
+        capture,
+        memory: backend.memory(),
+    };
+    Plan::new(graph, library, &options).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// Plans and runs once, capturing outputs.
+pub fn run(
+    backend: &mut WgpuBackend,
+    graph: &Graph,
+    library: &KernelLibrary,
+    inputs: &Inputs<'_>,
+) -> Execution {
+    let plan = plan(backend, graph, library, Capture::Outputs);
+    backend
+        .execute(&plan, inputs)
+        .unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A library with one added kernel.
+pub fn library(path: &str, source: &str) -> KernelLibrary {
+    let mut library = KernelLibrary::new();
+    library.add_source(path, source);
+    library
+}
+
+/// A kernel that copies one texel per invocation into a storage texture.
+pub fn copy_kernel(format: Format) -> String {
+    let ty = match format.sample_kind() {
+        SampleKind::Float | SampleKind::Depth => "f32",
+        SampleKind::Sint => "i32",
+        SampleKind::Uint => "u32",
+    };
+    format!(
+        "@group(0) @binding(0) var source: texture_2d<{ty}>;
+         @group(0) @binding(1) var target: texture_storage_2d<{format}, write>;
+         @compute @workgroup_size(8, 8)
+         fn main(@builtin(global_invocation_id) id: vec3u) {{
+             let size = textureDimensions(target);
+             if id.x >= size.x || id.y >= size.y {{ return; }}
+             textureStore(target, id.xy, textureLoad(source, id.xy, 0));
+         }}"
+    )
+}
+
+/// Bytes that say where they are and look like nothing else.
+pub fn noise(length: usize, seed: u32) -> Vec<u8> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9) | 1;
+    (0..length)
+        .map(|_| {
+            // xorshift32 (Marsaglia, 2003).
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            (state >> 11) as u8
+        })
+        .collect()
+}
+
+/// An image whose every texel differs from its neighbours and which loads and
+/// stores without change: floats are finite and normal, in the format's range.
+pub fn image(desc: TextureDesc) -> ImageData {
+    let length = desc.bytes().expect("a small image") as usize;
+    let mut bytes = noise(length, length as u32);
+    match desc.format {
+        Format::R16Float | Format::Rg16Float | Format::Rgba16Float => {
+            for half in bytes.chunks_exact_mut(2) {
+                // An exponent of 01xxx: from 2^-7 to 2^0.
+                half[1] = half[1] & 0x83 | 0x20 | half[1] & 0x1c;
+            }
+        }
+        Format::R32Float | Format::Rg32Float | Format::Rgba32Float | Format::Depth32Float => {
+            for float in bytes.chunks_exact_mut(4) {
+                // From 0.5 to 1, so that it is also a depth.
+                float[3] = 0x3f;
+                float[2] &= 0x7f;
+            }
+        }
+        Format::Rg11b10Ufloat => {
+            for texel in bytes.chunks_exact_mut(4) {
+                let [r, g, b] = [
+                    0x1e0 | u32::from(texel[0]) & 0x1f,
+                    0x200 | u32::from(texel[1]) & 0x3f,
+                    0x1c0 | u32::from(texel[2]) & 0x1f,
+                ];
+                texel.copy_from_slice(&(r | g << 11 | (b & 0x3ff) << 22).to_le_bytes());
+            }
+        }
+        _ => {}
+    }
+    ImageData::from_bytes(desc, bytes).expect("the length is the description's")
+}

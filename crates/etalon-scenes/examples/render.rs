@@ -41,12 +41,20 @@ fn main() -> Result<(), Box<dyn Error>> {
     std::fs::create_dir_all(folder)?;
 
     let frame = entry.frame(size)?;
-    write_png(&frame.colour, Look::Colour { exposure }, &folder.join("colour.png"))?;
+    write_png(
+        &frame.colour,
+        Look::Colour { exposure },
+        &folder.join("colour.png"),
+    )?;
     write_png(&frame.depth, Look::Depth, &folder.join("depth.png"))?;
     write_png(&frame.normal, Look::Vectors, &folder.join("normal.png"))?;
     write_png(&frame.specular, Look::Plain, &folder.join("specular.png"))?;
     write_png(&frame.specular, Look::Alpha, &folder.join("shininess.png"))?;
-    write_png(&frame.velocity, Look::Velocity { scale: 0.02 }, &folder.join("velocity.png"))?;
+    write_png(
+        &frame.velocity,
+        Look::Velocity { scale: 0.02 },
+        &folder.join("velocity.png"),
+    )?;
 
     let reflection = (entry.build)()?.reflection(size)?;
     let colour = frame.colour.to_rgba_f32()?;
@@ -54,22 +62,48 @@ fn main() -> Result<(), Box<dyn Error>> {
     let combined: Vec<_> = (colour.iter().zip(&specular).zip(&reflection.rays))
         .map(|((colour, specular), ray)| {
             let mirrored = mirrored(ray);
-            std::array::from_fn(|i| colour[i] + mirrored[i] * specular[i] * specular[3] * specular[3])
+            std::array::from_fn(|i| {
+                colour[i] + mirrored[i] * specular[i] * specular[3] * specular[3]
+            })
         })
         .collect();
     let desc = TextureDesc::d2(size.width(), size.height(), Format::Rgba32Float);
     let combined = ImageData::from_rgba_f32(desc, &combined)?;
-    write_png(&combined, Look::Colour { exposure }, &folder.join("combined.png"))?;
+    write_png(
+        &combined,
+        Look::Colour { exposure },
+        &folder.join("combined.png"),
+    )?;
     let image = |texel: fn(&MirrorRay) -> [f32; 4]| picture(&reflection, texel);
-    write_png(&image(mirrored)?, Look::Colour { exposure }, &folder.join("mirror.png"))?;
-    write_png(&image(reachable)?, Look::Plain, &folder.join("reachable.png"))?;
-    println!("wrote {name} at {}×{} to {}", size.width(), size.height(), folder.display());
+    write_png(
+        &image(mirrored)?,
+        Look::Colour { exposure },
+        &folder.join("mirror.png"),
+    )?;
+    write_png(
+        &image(reachable)?,
+        Look::Plain,
+        &folder.join("reachable.png"),
+    )?;
+    println!(
+        "wrote {name} at {}×{} to {}",
+        size.width(),
+        size.height(),
+        folder.display()
+    );
     Ok(())
 }
 
-fn picture(reflection: &Reflection, texel: fn(&MirrorRay) -> [f32; 4]) -> Result<ImageData, Box<dyn Error>> {
+fn picture(
+    reflection: &Reflection,
+    texel: fn(&MirrorRay) -> [f32; 4],
+) -> Result<ImageData, Box<dyn Error>> {
     let texels: Vec<_> = reflection.rays.iter().map(texel).collect();
-    let desc = TextureDesc::d2(reflection.size.width(), reflection.size.height(), Format::Rgba32Float);
+    let desc = TextureDesc::d2(
+        reflection.size.width(),
+        reflection.size.height(),
+        Format::Rgba32Float,
+    );
     Ok(ImageData::from_rgba_f32(desc, &texels)?)
 }
 

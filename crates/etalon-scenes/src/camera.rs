@@ -73,12 +73,20 @@ impl Pose {
     /// If an argument is not finite, or the view direction is zero or parallel
     /// to `up`.
     pub fn look_at(position: DVec3, target: DVec3, up: DVec3) -> Result<Self, CameraError> {
-        for (what, value) in [("position", position), ("target", target), ("up direction", up)] {
+        for (what, value) in [
+            ("position", position),
+            ("target", target),
+            ("up direction", up),
+        ] {
             if !value.is_finite() {
                 return Err(CameraError::NotFinite { what, value });
             }
         }
-        let none = CameraError::NoOrientation { position, target, up };
+        let none = CameraError::NoOrientation {
+            position,
+            target,
+            up,
+        };
         let backward = (position - target).try_normalize().ok_or(none.clone())?;
         let up = up.try_normalize().ok_or(none.clone())?;
         let right = up.cross(backward);
@@ -87,7 +95,10 @@ impl Pose {
             return Err(none);
         }
         let right = right.normalize();
-        Ok(Self { position, orientation: DMat3::from_cols(right, backward.cross(right), backward) })
+        Ok(Self {
+            position,
+            orientation: DMat3::from_cols(right, backward.cross(right), backward),
+        })
     }
 
     /// World position.
@@ -175,7 +186,10 @@ impl Projection {
             return Err(CameraError::FieldOfView(vertical_fov));
         }
         let y = 1.0 / (0.5 * vertical_fov).tan();
-        Self::new(DVec2::new(y * f64::from(size.height()) / f64::from(size.width()), y), near)
+        Self::new(
+            DVec2::new(y * f64::from(size.height()) / f64::from(size.width()), y),
+            near,
+        )
     }
 
     /// `(s_x, s_y)`: the diagonal of the projection matrix.
@@ -206,11 +220,14 @@ impl Projection {
     #[must_use]
     pub fn project(&self, view: DVec3) -> Option<Projected> {
         let w = -view.z;
-        if !(w > 0.0) {
+        if w.is_nan() || w <= 0.0 {
             return None;
         }
         Some(Projected {
-            uv: DVec2::new(0.5 + 0.5 * self.scale.x * view.x / w, 0.5 - 0.5 * self.scale.y * view.y / w),
+            uv: DVec2::new(
+                0.5 + 0.5 * self.scale.x * view.x / w,
+                0.5 - 0.5 * self.scale.y * view.y / w,
+            ),
             depth: self.near / w,
         })
     }
@@ -218,7 +235,11 @@ impl Projection {
     /// The point at view distance 1 (`z = −1`) that is seen at `uv`.
     #[must_use]
     pub fn direction(&self, uv: DVec2) -> DVec3 {
-        DVec3::new((2.0 * uv.x - 1.0) / self.scale.x, (1.0 - 2.0 * uv.y) / self.scale.y, -1.0)
+        DVec3::new(
+            (2.0 * uv.x - 1.0) / self.scale.x,
+            (1.0 - 2.0 * uv.y) / self.scale.y,
+            -1.0,
+        )
     }
 
     /// The view position seen at `uv` with a device depth over 0.
@@ -250,7 +271,12 @@ impl Camera {
         if !(vertical_fov > 0.0 && vertical_fov < std::f64::consts::PI) {
             return Err(CameraError::FieldOfView(vertical_fov));
         }
-        Ok(Self { pose, previous: pose, vertical_fov, near: Self::DEFAULT_NEAR })
+        Ok(Self {
+            pose,
+            previous: pose,
+            vertical_fov,
+            near: Self::DEFAULT_NEAR,
+        })
     }
 
     /// The same camera with its near plane elsewhere.
@@ -298,7 +324,10 @@ impl Camera {
     /// The camera of the frame before, at rest.
     #[must_use]
     pub const fn previous(&self) -> Self {
-        Self { pose: self.previous, ..*self }
+        Self {
+            pose: self.previous,
+            ..*self
+        }
     }
 
     /// The projection for a picture of `size`.
@@ -316,8 +345,11 @@ impl Camera {
     pub fn ray(&self, projection: &Projection, uv: DVec2) -> Ray {
         let direction = projection.direction(uv);
         let length = direction.length();
-        Ray::new(self.pose.position, self.pose.orientation * (direction / length))
-            .starting_at(self.near * length)
+        Ray::new(
+            self.pose.position,
+            self.pose.orientation * (direction / length),
+        )
+        .starting_at(self.near * length)
     }
 }
 
@@ -328,14 +360,28 @@ mod tests {
     use super::*;
 
     fn camera() -> Camera {
-        let pose = Pose::look_at(DVec3::new(3.0, 2.0, 5.0), DVec3::new(-1.0, 0.5, -2.0), DVec3::Y);
-        Camera::new(pose.unwrap(), FRAC_PI_3).unwrap().with_near(0.25).unwrap()
+        let pose = Pose::look_at(
+            DVec3::new(3.0, 2.0, 5.0),
+            DVec3::new(-1.0, 0.5, -2.0),
+            DVec3::Y,
+        );
+        Camera::new(pose.unwrap(), FRAC_PI_3)
+            .unwrap()
+            .with_near(0.25)
+            .unwrap()
     }
 
     #[test]
     fn projecting_undoes_unprojecting() {
-        let projection = camera().projection(FrameSize::new(257, 129).unwrap()).unwrap();
-        for (u, v, depth) in [(0.5, 0.5, 1.0), (0.0, 0.0, 0.5), (1.0, 0.25, 1e-6), (0.125, 0.875, 1e-12)] {
+        let projection = camera()
+            .projection(FrameSize::new(257, 129).unwrap())
+            .unwrap();
+        for (u, v, depth) in [
+            (0.5, 0.5, 1.0),
+            (0.0, 0.0, 0.5),
+            (1.0, 0.25, 1e-6),
+            (0.125, 0.875, 1e-12),
+        ] {
             let view = projection.unproject(DVec2::new(u, v), depth);
             let seen = projection.project(view).unwrap();
             // Three rounded operations each way, on values of at most 1.
@@ -347,7 +393,9 @@ mod tests {
     #[test]
     fn matrices_agree_with_the_formulas() {
         let camera = camera();
-        let projection = camera.projection(FrameSize::new(640, 360).unwrap()).unwrap();
+        let projection = camera
+            .projection(FrameSize::new(640, 360).unwrap())
+            .unwrap();
         let world = DVec3::new(-0.5, 1.25, 0.75);
         let view = camera.pose().to_view(world);
         let by_matrix = camera.pose().view_matrix() * world.extend(1.0);
@@ -369,11 +417,19 @@ mod tests {
         let target = DVec3::new(-1.0, 0.5, -2.0);
         let middle = projection.project(camera.pose().to_view(target)).unwrap();
         assert!((middle.uv - DVec2::splat(0.5)).length() < 1e-15);
-        let above = projection.project(camera.pose().to_view(target + DVec3::Y)).unwrap();
+        let above = projection
+            .project(camera.pose().to_view(target + DVec3::Y))
+            .unwrap();
         assert!(above.uv.y < 0.5 && (above.uv.x - 0.5).abs() < 1e-15);
         // Of two points, the one further from the eye has the smaller depth.
         let beyond = target + (target - camera.pose().position());
-        assert!(projection.project(camera.pose().to_view(beyond)).unwrap().depth < middle.depth);
+        assert!(
+            projection
+                .project(camera.pose().to_view(beyond))
+                .unwrap()
+                .depth
+                < middle.depth
+        );
     }
 
     #[test]
@@ -384,11 +440,15 @@ mod tests {
         let ray = camera.ray(&projection, uv);
         assert!((ray.direction().length() - 1.0).abs() < 1e-15);
         for t in [ray.start(), 1.0, 1e3] {
-            let seen = projection.project(camera.pose().to_view(ray.at(t))).unwrap();
+            let seen = projection
+                .project(camera.pose().to_view(ray.at(t)))
+                .unwrap();
             assert!((seen.uv - uv).length() < 1e-14);
         }
         // The ray begins on the near plane, where depth is 1.
-        let start = projection.project(camera.pose().to_view(ray.at(ray.start()))).unwrap();
+        let start = projection
+            .project(camera.pose().to_view(ray.at(ray.start())))
+            .unwrap();
         assert!((start.depth - 1.0).abs() < 1e-14);
     }
 
@@ -413,15 +473,24 @@ mod tests {
         ));
         assert!(matches!(
             Pose::look_at(DVec3::new(f64::NAN, 0.0, 0.0), here, DVec3::Y),
-            Err(CameraError::NotFinite { what: "position", .. })
+            Err(CameraError::NotFinite {
+                what: "position",
+                ..
+            })
         ));
         let pose = Pose::look_at(here, DVec3::ZERO, DVec3::Y).unwrap();
         for fov in [0.0, -1.0, std::f64::consts::PI, f64::NAN] {
-            assert!(matches!(Camera::new(pose, fov), Err(CameraError::FieldOfView(_))));
+            assert!(matches!(
+                Camera::new(pose, fov),
+                Err(CameraError::FieldOfView(_))
+            ));
         }
         for near in [0.0, -1.0, f64::INFINITY, f64::NAN] {
             let camera = Camera::new(pose, 1.0).unwrap();
-            assert!(matches!(camera.with_near(near), Err(CameraError::NearPlane(_))));
+            assert!(matches!(
+                camera.with_near(near),
+                Err(CameraError::NearPlane(_))
+            ));
         }
         assert!(Projection::new(DVec2::new(0.0, 1.0), 0.1).is_err());
     }

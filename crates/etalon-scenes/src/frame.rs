@@ -60,11 +60,18 @@ impl FrameSize {
     /// If one is zero or over [`MAX_SIDE`], or the largest of the frame's images
     /// would take over 1 GiB.
     pub fn new(width: u32, height: u32) -> Result<Self, FrameError> {
-        let limits = Limits { max_texture_2d: MAX_SIDE, ..Limits::default() };
+        let limits = Limits {
+            max_texture_2d: MAX_SIDE,
+            ..Limits::default()
+        };
         // Of the formats of a frame the one with the largest texels.
         TextureDesc::d2(width, height, Format::Rgba16Float)
             .validate(&limits)
-            .map_err(|source| FrameError::Size { width, height, source })?;
+            .map_err(|source| FrameError::Size {
+                width,
+                height,
+                source,
+            })?;
         Ok(Self { width, height })
     }
 
@@ -166,7 +173,10 @@ impl Frame {
     /// Width and height.
     #[must_use]
     pub const fn size(&self) -> FrameSize {
-        FrameSize { width: self.colour.desc.extent.width, height: self.colour.desc.extent.height }
+        FrameSize {
+            width: self.colour.desc.extent.width,
+            height: self.colour.desc.extent.height,
+        }
     }
 
     /// The images with their names, in the order of [`Frame::IMAGES`].
@@ -184,7 +194,10 @@ impl Frame {
     /// The image of a name.
     #[must_use]
     pub fn image(&self, name: &str) -> Option<&ImageData> {
-        self.images().into_iter().find(|(known, _)| *known == name).map(|(_, image)| image)
+        self.images()
+            .into_iter()
+            .find(|(known, _)| *known == name)
+            .map(|(_, image)| image)
     }
 }
 
@@ -194,13 +207,27 @@ mod tests {
 
     #[test]
     fn impossible_sizes_are_refused_before_allocation() {
-        for (width, height) in [(0, 0), (0, 5), (5, 0), (u32::MAX, u32::MAX), (16_385, 1), (16_384, 16_384)] {
+        for (width, height) in [
+            (0, 0),
+            (0, 5),
+            (5, 0),
+            (u32::MAX, u32::MAX),
+            (16_385, 1),
+            (16_384, 16_384),
+        ] {
             assert!(
                 matches!(FrameSize::new(width, height), Err(FrameError::Size { .. })),
                 "{width}×{height}"
             );
         }
-        for (width, height) in [(1, 1), (1, 4096), (7, 13), (257, 129), (1920, 1080), (8192, 4096)] {
+        for (width, height) in [
+            (1, 1),
+            (1, 4096),
+            (7, 13),
+            (257, 129),
+            (1920, 1080),
+            (8192, 4096),
+        ] {
             let size = FrameSize::new(width, height).unwrap();
             assert_eq!(size.pixels() as u64, u64::from(width) * u64::from(height));
         }
@@ -210,14 +237,20 @@ mod tests {
     fn an_empty_frame_is_all_zero_and_complete() {
         let size = FrameSize::new(7, 13).unwrap();
         let projection = Projection::perspective(1.0, 0.1, size).unwrap();
-        let camera =
-            FrameCamera { projection, view: DMat4::IDENTITY, previous_view: DMat4::IDENTITY };
+        let camera = FrameCamera {
+            projection,
+            view: DMat4::IDENTITY,
+            previous_view: DMat4::IDENTITY,
+        };
         let frame = Frame::empty(camera, size).unwrap();
         assert_eq!(frame.size(), size);
         for ((name, format), (known, image)) in Frame::IMAGES.into_iter().zip(frame.images()) {
             assert_eq!((name, format), (known, image.desc.format));
             assert_eq!(frame.image(name), Some(image));
-            assert_eq!(image.bytes.len(), size.pixels() * format.texel_bytes() as usize);
+            assert_eq!(
+                image.bytes.len(),
+                size.pixels() * format.texel_bytes() as usize
+            );
             assert!(image.bytes.iter().all(|&byte| byte == 0));
         }
         assert_eq!(frame.image("nothing"), None);

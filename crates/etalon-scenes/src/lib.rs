@@ -6,6 +6,22 @@
 //! * [`scenes`]: a registry of procedural scenes.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
+//!
+//! ```
+//! use etalon_scenes::{FrameSize, scene};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let entry = scene("mirror-planes").ok_or("no such scene")?;
+//! let size = FrameSize::new(64, 36)?;
+//! let frame = entry.frame(size)?;
+//! assert_eq!(frame.colour.desc.extent.width, 64);
+//!
+//! // What a perfect mirror would show at the pixel in the middle.
+//! let world = (entry.build)()?;
+//! println!("{:?}", world.reflection(size)?.at(32, 18));
+//! # Ok(())
+//! # }
+//! ```
 
 #![forbid(unsafe_code)]
 

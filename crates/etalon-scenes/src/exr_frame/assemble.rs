@@ -18,13 +18,20 @@ pub(super) fn frame(
     options: &ExrOptions,
 ) -> Result<LoadedFrame, ExrError> {
     let projection = projection(file, options)?;
-    let camera = FrameCamera { projection, view: DMat4::IDENTITY, previous_view: DMat4::IDENTITY };
+    let camera = FrameCamera {
+        projection,
+        view: DMat4::IDENTITY,
+        previous_view: DMat4::IDENTITY,
+    };
     let mut wanted: Vec<Place> = Vec::new();
     let mut slot = |place: Place| {
-        wanted.iter().position(|&known| known == place).unwrap_or_else(|| {
-            wanted.push(place);
-            wanted.len() - 1
-        })
+        wanted
+            .iter()
+            .position(|&known| known == place)
+            .unwrap_or_else(|| {
+                wanted.push(place);
+                wanted.len() - 1
+            })
     };
     let colour = chosen.colour.map(|place| place.map(&mut slot));
     let depth = chosen.depth.map(&mut slot);
@@ -36,13 +43,20 @@ pub(super) fn frame(
     let mut frame = Frame::empty(camera, file.size)?;
     if options.colour_format != frame.colour.desc.format {
         let desc = TextureDesc::d2(file.size.width(), file.size.height(), options.colour_format);
-        frame.colour =
-            ImageData::zeroed(desc).map_err(|source| FrameError::Image { image: "colour", source })?;
+        frame.colour = ImageData::zeroed(desc).map_err(|source| FrameError::Image {
+            image: "colour",
+            source,
+        })?;
     }
     store(&mut frame.colour, |pixel| {
         let [r, g, b] = [0, 1, 2].map(|i| colour[i].map_or(0.0, |slot| planes[slot][pixel]));
         let covered = r != 0.0 || g != 0.0 || b != 0.0;
-        [r, g, b, colour[3].map_or(f32::from(u8::from(covered)), |slot| planes[slot][pixel])]
+        [
+            r,
+            g,
+            b,
+            colour[3].map_or(f32::from(u8::from(covered)), |slot| planes[slot][pixel]),
+        ]
     });
     let mut nearest = f64::INFINITY;
     if let Some(slot) = depth {
@@ -59,11 +73,18 @@ pub(super) fn frame(
     if let Some(slots) = normal {
         store(&mut frame.normal, |pixel| {
             let [x, y, z] = slots.map(|slot| planes[slot][pixel]);
-            [x, y, z, f32::from(u8::from(x != 0.0 || y != 0.0 || z != 0.0))]
+            [
+                x,
+                y,
+                z,
+                f32::from(u8::from(x != 0.0 || y != 0.0 || z != 0.0)),
+            ]
         });
     }
     if let Some(slots) = specular {
-        store(&mut frame.specular, |pixel| slots.map(|slot| planes[slot][pixel]));
+        store(&mut frame.specular, |pixel| {
+            slots.map(|slot| planes[slot][pixel])
+        });
     }
     if let (Some(slots), Some(motion)) = (motion, &chosen.names.motion) {
         let size = DVec2::new(file.size.width().into(), file.size.height().into());
@@ -71,14 +92,19 @@ pub(super) fn frame(
             MotionDirection::Backward => -1.0,
             MotionDirection::Forward => 1.0,
         };
-        let scale = options.motion_scale * sign / size;
+        // The file's y points up, that of uv down.
+        let scale = options.motion_scale * DVec2::new(sign, -sign) / size;
         store(&mut frame.velocity, |pixel| {
             let [u, v] = slots.map(|slot| f64::from(planes[slot][pixel]));
             [(u * scale.x) as f32, (v * scale.y) as f32, 0.0, 0.0]
         });
     }
     let available = (file.parts.iter())
-        .flat_map(|part| part.channels.iter().map(|channel| ChannelName::new(&*part.name, &**channel)))
+        .flat_map(|part| {
+            part.channels
+                .iter()
+                .map(|channel| ChannelName::new(&*part.name, &**channel))
+        })
         .collect();
     Ok(LoadedFrame {
         frame,
@@ -104,7 +130,13 @@ fn projection(file: &File, options: &ExrOptions) -> Result<Projection, ExrError>
 
 /// The device depth of a value from the file. NaN stays NaN: it is for the
 /// effects to sanitise.
-fn device_depth(value: f64, pixel: usize, file: &File, projection: &Projection, options: &ExrOptions) -> f64 {
+fn device_depth(
+    value: f64,
+    pixel: usize,
+    file: &File,
+    projection: &Projection,
+    options: &ExrOptions,
+) -> f64 {
     if options.depth == DepthMeaning::Device {
         return value;
     }
@@ -127,7 +159,11 @@ fn device_depth(value: f64, pixel: usize, file: &File, projection: &Projection, 
 /// Encodes an image texel by texel.
 fn store(image: &mut ImageData, mut texel: impl FnMut(usize) -> [f32; 4]) {
     let format = image.desc.format;
-    for (pixel, bytes) in image.bytes.chunks_exact_mut(format.texel_bytes() as usize).enumerate() {
+    for (pixel, bytes) in image
+        .bytes
+        .chunks_exact_mut(format.texel_bytes() as usize)
+        .enumerate()
+    {
         format.encode(etalon_core::texel::Texel::Float(texel(pixel)), bytes);
     }
 }

@@ -4,15 +4,15 @@ use std::collections::HashSet;
 use std::io::Cursor;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use exr::block::UncompressedBlock;
 use exr::block::chunk::{Chunk, CompressedBlock};
 use exr::block::lines::LineRef;
 use exr::block::reader::{ChunksReader, Reader};
-use exr::block::UncompressedBlock;
 use exr::compression::Compression;
 use exr::meta::BlockDescription;
+use exr::meta::MetaData;
 use exr::meta::attribute::SampleType;
 use exr::meta::header::Header;
-use exr::meta::MetaData;
 
 use super::ExrError;
 use crate::frame::FrameSize;
@@ -58,7 +58,10 @@ pub(super) struct Place {
 /// Reads and checks the headers; allocates no more than they are long.
 pub(super) fn read_header(bytes: &[u8], max_bytes: u64) -> Result<File, ExrError> {
     let meta = guarded(|| MetaData::read_from_buffered(Cursor::new(bytes), false))?;
-    let first = meta.headers.first().ok_or_else(|| ExrError::Malformed("it has no parts".into()))?;
+    let first = meta
+        .headers
+        .first()
+        .ok_or_else(|| ExrError::Malformed("it has no parts".into()))?;
     let display = window(first.shared_attributes.display_window);
     let side = |length: u64| u32::try_from(length).unwrap_or(u32::MAX);
     let size = FrameSize::new(side(display.width), side(display.height))?;
@@ -66,7 +69,9 @@ pub(super) fn read_header(bytes: &[u8], max_bytes: u64) -> Result<File, ExrError
     for (index, header) in meta.headers.iter().enumerate() {
         check_part(index, header, max_bytes)?;
         if window(header.shared_attributes.display_window) != display {
-            return Err(ExrError::Malformed(format!("part {index} has another display window than part 0")));
+            return Err(ExrError::Malformed(format!(
+                "part {index} has another display window than part 0"
+            )));
         }
         chunks = chunks.saturating_add(header.chunk_count as u64);
     }
@@ -83,10 +88,22 @@ pub(super) fn read_header(bytes: &[u8], max_bytes: u64) -> Result<File, ExrError
         size,
         parts: (meta.headers.iter())
             .map(|header| Part {
-                name: header.own_attributes.layer_name.as_ref().map(text).unwrap_or_default(),
+                name: header
+                    .own_attributes
+                    .layer_name
+                    .as_ref()
+                    .map(text)
+                    .unwrap_or_default(),
                 view: header.own_attributes.view_name.as_ref().map(text),
-                views: (header.own_attributes.multi_view_names.iter().flatten()).map(text).collect(),
-                channels: header.channels.list.iter().map(|channel| text(&channel.name)).collect(),
+                views: (header.own_attributes.multi_view_names.iter().flatten())
+                    .map(text)
+                    .collect(),
+                channels: header
+                    .channels
+                    .list
+                    .iter()
+                    .map(|channel| text(&channel.name))
+                    .collect(),
             })
             .collect(),
         screen_window_width: first.own_attributes.screen_window_width.into(),
@@ -120,7 +137,9 @@ fn check_part(index: usize, header: &Header, max_bytes: u64) -> Result<(), ExrEr
     };
     let (width, height) = (header.layer_size.width(), header.layer_size.height());
     if width == 0 || height == 0 {
-        return Err(ExrError::Malformed(format!("the data window of part {index} is empty")));
+        return Err(ExrError::Malformed(format!(
+            "the data window of part {index} is empty"
+        )));
     }
     let block = match header.blocks {
         BlockDescription::ScanLines => bytes(width, header.compression.scan_lines_per_block()),
@@ -129,7 +148,11 @@ fn check_part(index: usize, header: &Header, max_bytes: u64) -> Result<(), ExrEr
     for (what, bytes) in [("pixels", bytes(width, height)), ("blocks", block)] {
         if bytes > max_bytes {
             let what = format!("the {what} of part {index}");
-            return Err(ExrError::TooLarge { what, bytes, limit: max_bytes });
+            return Err(ExrError::TooLarge {
+                what,
+                bytes,
+                limit: max_bytes,
+            });
         }
     }
     Ok(())
@@ -143,23 +166,36 @@ pub(super) fn read_planes(
     max_bytes: u64,
 ) -> Result<Vec<Vec<f32>>, ExrError> {
     let total = (file.size.pixels() as u64).saturating_mul(4 * places.len() as u64);
-    let too_large =
-        || ExrError::TooLarge { what: "the frame".into(), bytes: total, limit: max_bytes };
+    let too_large = || ExrError::TooLarge {
+        what: "the frame".into(),
+        bytes: total,
+        limit: max_bytes,
+    };
     if total > max_bytes {
         return Err(too_large());
     }
     let mut planes = Vec::new();
     for _ in places {
         let mut plane = Vec::new();
-        plane.try_reserve_exact(file.size.pixels()).map_err(|_| too_large())?;
+        plane
+            .try_reserve_exact(file.size.pixels())
+            .map_err(|_| too_large())?;
         plane.resize(file.size.pixels(), 0.0_f32);
         planes.push(plane);
     }
     let reader = guarded(|| Reader::read_from_buffered(Cursor::new(bytes), false))?;
     for (index, header) in reader.headers().iter().enumerate() {
         let wanted = places.iter().any(|place| place.part == index);
-        if wanted && header.channels.list.iter().any(|channel| channel.sampling != exr::math::Vec2(1, 1)) {
-            return Err(ExrError::Unsupported(format!("part {index} has subsampled channels")));
+        if wanted
+            && header
+                .channels
+                .list
+                .iter()
+                .any(|channel| channel.sampling != exr::math::Vec2(1, 1))
+        {
+            return Err(ExrError::Unsupported(format!(
+                "part {index} has subsampled channels"
+            )));
         }
     }
     // Chunks are read one after the other to the end, so a file that was cut
@@ -173,7 +209,10 @@ pub(super) fn read_planes(
             continue;
         }
         if let Some(block) = decompress(chunk, &meta)? {
-            let (x, y) = (block.index.pixel_position.x(), block.index.pixel_position.y());
+            let (x, y) = (
+                block.index.pixel_position.x(),
+                block.index.pixel_position.y(),
+            );
             if !seen.insert((block.index.layer, x, y)) {
                 return Err(ExrError::Malformed(format!(
                     "part {} has two blocks at {x}, {y}",
@@ -188,12 +227,20 @@ pub(super) fn read_planes(
         let expected = match header.blocks {
             BlockDescription::ScanLines => header.chunk_count,
             BlockDescription::Tiles(tiles) => {
-                header.layer_size.width().div_ceil(tiles.tile_size.width().max(1))
-                    * header.layer_size.height().div_ceil(tiles.tile_size.height().max(1))
+                header
+                    .layer_size
+                    .width()
+                    .div_ceil(tiles.tile_size.width().max(1))
+                    * header
+                        .layer_size
+                        .height()
+                        .div_ceil(tiles.tile_size.height().max(1))
             }
         };
         if places.iter().any(|place| place.part == index) && blocks != expected {
-            return Err(ExrError::Malformed(format!("part {index} has {blocks} of its {expected} blocks")));
+            return Err(ExrError::Malformed(format!(
+                "part {index} has {blocks} of its {expected} blocks"
+            )));
         }
     }
     Ok(planes)
@@ -203,7 +250,9 @@ pub(super) fn read_planes(
 fn decompress(chunk: Chunk, meta: &MetaData) -> Result<Option<UncompressedBlock>, ExrError> {
     let part = chunk.layer_index;
     let Some(header) = meta.headers.get(part) else {
-        return Err(ExrError::Malformed(format!("a chunk of part {part}, which does not exist")));
+        return Err(ExrError::Malformed(format!(
+            "a chunk of part {part}, which does not exist"
+        )));
     };
     let data = match &chunk.compressed_block {
         CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
@@ -215,15 +264,25 @@ fn decompress(chunk: Chunk, meta: &MetaData) -> Result<Option<UncompressedBlock>
         }
         _ => return Err(ExrError::Unsupported(format!("part {part} is deep"))),
     };
-    if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+    if matches!(
+        header.compression,
+        Compression::DWAA(_) | Compression::DWAB(_)
+    ) {
         let area = guarded(|| {
             let coordinates = header.get_block_data_indices(&chunk.compressed_block)?;
-            Ok(header.get_absolute_block_pixel_coordinates(coordinates)?.size.area())
+            Ok(header
+                .get_absolute_block_pixel_coordinates(coordinates)?
+                .size
+                .area())
         })?;
         check_dwa(data, area.saturating_mul(header.channels.bytes_per_pixel))?;
     }
     let block = guarded(|| UncompressedBlock::decompress_chunk(chunk, meta, false))?;
-    let expected = block.index.pixel_size.area().saturating_mul(header.channels.bytes_per_pixel);
+    let expected = block
+        .index
+        .pixel_size
+        .area()
+        .saturating_mul(header.channels.bytes_per_pixel);
     if block.data.len() != expected {
         return Err(ExrError::Malformed(format!(
             "a block of part {part} has {} bytes instead of {expected}",
@@ -244,9 +303,9 @@ fn check_dwa(data: &[u8], block: usize) -> Result<(), ExrError> {
     let limit = (block as u64).saturating_mul(4).saturating_add(1 << 16);
     let counts = data.as_chunks::<8>().0.iter().take(10).skip(1);
     match counts.map(|bytes| u64::from_le_bytes(*bytes)).max() {
-        Some(count) if count > limit => {
-            Err(ExrError::Malformed(format!("a block of {block} bytes claims to hold {count}")))
-        }
+        Some(count) if count > limit => Err(ExrError::Malformed(format!(
+            "a block of {block} bytes claims to hold {count}"
+        ))),
         _ => Ok(()),
     }
 }
@@ -265,7 +324,10 @@ fn place_block(
     };
     let data = window(header.data_window());
     for line in block.lines(&header.channels) {
-        let place = Place { part, channel: line.location.channel };
+        let place = Place {
+            part,
+            channel: line.location.channel,
+        };
         let Some(channel) = header.channels.list.get(place.channel) else {
             continue;
         };
@@ -274,9 +336,15 @@ fn place_block(
             continue;
         }
         let start = data.x + line.location.position.x() as i64 - file.display.x;
-        for (_, plane) in places.iter().zip(&mut *planes).filter(|(wanted, _)| **wanted == place) {
+        for (_, plane) in places
+            .iter()
+            .zip(&mut *planes)
+            .filter(|(wanted, _)| **wanted == place)
+        {
             let width = file.size.width() as usize;
-            let row = plane.get_mut(y as usize * width..).and_then(|rest| rest.get_mut(..width));
+            let row = plane
+                .get_mut(y as usize * width..)
+                .and_then(|rest| rest.get_mut(..width));
             if let Some(row) = row {
                 place_line(&line, channel.sample_type, start, row);
             }
@@ -289,11 +357,27 @@ fn place_block(
 fn place_line(line: &LineRef<'_>, kind: SampleType, start: i64, row: &mut [f32]) {
     // The decoder hands samples out in the machine's byte order.
     let mut samples: Box<dyn Iterator<Item = f32>> = match kind {
-        SampleType::F16 => {
-            Box::new(line.value.as_chunks().0.iter().map(|b| half::f16::from_ne_bytes(*b).to_f32()))
-        }
-        SampleType::F32 => Box::new(line.value.as_chunks().0.iter().map(|b| f32::from_ne_bytes(*b))),
-        SampleType::U32 => Box::new(line.value.as_chunks().0.iter().map(|b| u32::from_ne_bytes(*b) as f32)),
+        SampleType::F16 => Box::new(
+            line.value
+                .as_chunks()
+                .0
+                .iter()
+                .map(|b| half::f16::from_ne_bytes(*b).to_f32()),
+        ),
+        SampleType::F32 => Box::new(
+            line.value
+                .as_chunks()
+                .0
+                .iter()
+                .map(|b| f32::from_ne_bytes(*b)),
+        ),
+        SampleType::U32 => Box::new(
+            line.value
+                .as_chunks()
+                .0
+                .iter()
+                .map(|b| u32::from_ne_bytes(*b) as f32),
+        ),
     };
     let before = usize::try_from(-start).unwrap_or(0);
     let first = usize::try_from(start).unwrap_or(0);
@@ -313,7 +397,9 @@ fn place_line(line: &LineRef<'_>, kind: SampleType, start: i64, row: &mut [f32])
 fn guarded<T>(decode: impl FnOnce() -> exr::error::Result<T>) -> Result<T, ExrError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(exr::error::Error::NotSupported(what))) => Err(ExrError::Unsupported(what.into_owned())),
+        Ok(Err(exr::error::Error::NotSupported(what))) => {
+            Err(ExrError::Unsupported(what.into_owned()))
+        }
         Ok(Err(exr::error::Error::Invalid(what))) => Err(ExrError::Malformed(what.into_owned())),
         Ok(Err(error)) => Err(ExrError::Malformed(error.to_string())),
         Err(_) => Err(ExrError::Malformed("the decoder gave up on it".into())),

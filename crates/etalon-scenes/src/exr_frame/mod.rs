@@ -15,7 +15,7 @@
 //! | colour | `R`, `G`, `B` and `A`, or `Y`; layers called *rgba*, *beauty*, *combined* … before others | linear colour as it is |
 //! | depth | `Z`, `depth.Z`, `zdepth`, … ; `ZBack` only if there is nothing else | device depth, see [`DepthMeaning`] |
 //! | normal | `X`, `Y`, `Z` or `R`, `G`, `B` of a layer called *N*, *normal* … | as it is, w = 1 where it is not 0 |
-//! | velocity | `u`, `v` or `X`, `Y` of a layer called *back*, *forward*, *motion* … in pixels | uv units, now minus before |
+//! | velocity | `u`, `v` or `X`, `Y` of a layer called *back*, *forward*, *motion* … in pixels, y up | uv units, now minus before |
 //! | specular | `R`, `G`, `B`, `A` of a layer called *specularMap* | as it is |
 //!
 //! Of a stereo file one view is read: the one asked for, or the one in which
@@ -147,7 +147,9 @@ pub struct ExrOptions {
     /// write large numbers, such as 1e10 or infinity, where nothing was hit.
     pub far: f64,
     /// What motion vectors are multiplied with, for writers that count y
-    /// upwards or in another unit than pixels.
+    /// downwards (1, −1) or in another unit than pixels. A renderer that writes
+    /// the motion while its shutter is open needs the inverse of that part of
+    /// the frame's time.
     pub motion_scale: DVec2,
     /// `rgba16float`, or `rgba32float` for colours beyond ±65504.
     pub colour_format: Format,
@@ -193,8 +195,10 @@ pub struct LoadedFrame {
 /// If the file cannot be read, is invalid, uses deep or subsampled channels, is
 /// larger than allowed, or has no channels of the names given or looked for.
 pub fn load_exr(path: &Path, options: &ExrOptions) -> Result<LoadedFrame, ExrError> {
-    let bytes =
-        std::fs::read(path).map_err(|source| ExrError::Io { path: path.display().to_string(), source })?;
+    let bytes = std::fs::read(path).map_err(|source| ExrError::Io {
+        path: path.display().to_string(),
+        source,
+    })?;
     decode_exr(&bytes, options)
 }
 
@@ -203,19 +207,30 @@ pub fn load_exr(path: &Path, options: &ExrOptions) -> Result<LoadedFrame, ExrErr
 /// # Errors
 /// As [`load_exr`].
 pub fn decode_exr(bytes: &[u8], options: &ExrOptions) -> Result<LoadedFrame, ExrError> {
-    if !matches!(options.colour_format, Format::Rgba16Float | Format::Rgba32Float) {
+    if !matches!(
+        options.colour_format,
+        Format::Rgba16Float | Format::Rgba32Float
+    ) {
         return Err(ExrError::Option {
             option: "colour_format",
             value: options.colour_format.to_string(),
             need: "rgba16float or rgba32float",
         });
     }
-    if !(options.far > 0.0) {
-        return Err(ExrError::Option { option: "far", value: options.far.to_string(), need: "over 0" });
+    if options.far.is_nan() || options.far <= 0.0 {
+        return Err(ExrError::Option {
+            option: "far",
+            value: options.far.to_string(),
+            need: "over 0",
+        });
     }
     if !options.motion_scale.is_finite() {
         let value = options.motion_scale.to_string();
-        return Err(ExrError::Option { option: "motion_scale", value, need: "finite" });
+        return Err(ExrError::Option {
+            option: "motion_scale",
+            value,
+            need: "finite",
+        });
     }
     let file = decode::read_header(bytes, options.max_bytes)?;
     let (channels, view) = names::choose(&file, options)?;

@@ -19,7 +19,10 @@ impl ChannelName {
     /// A channel of a part.
     #[must_use]
     pub fn new(part: impl Into<String>, channel: impl Into<String>) -> Self {
-        Self { part: part.into(), channel: channel.into() }
+        Self {
+            part: part.into(),
+            channel: channel.into(),
+        }
     }
 }
 
@@ -53,7 +56,8 @@ pub enum MotionDirection {
     Forward,
 }
 
-/// Channels of motion vectors, in pixels with y down.
+/// Channels of motion vectors: pixels, x to the right and y up, as compositing
+/// programs have it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Motion {
     /// Horizontal and vertical.
@@ -102,22 +106,33 @@ pub(super) struct Chosen {
 }
 
 /// Finds the channels of a frame, and the view they are of.
-pub(super) fn choose(file: &File, options: &ExrOptions) -> Result<(Chosen, Option<String>), ExrError> {
+pub(super) fn choose(
+    file: &File,
+    options: &ExrOptions,
+) -> Result<(Chosen, Option<String>), ExrError> {
     let all = Catalogue::new(file);
     if let Some(view) = &options.view
         && !all.views.contains(view)
     {
-        return Err(ExrError::NoView { view: view.clone(), available: all.views });
+        return Err(ExrError::NoView {
+            view: view.clone(),
+            available: all.views,
+        });
     }
     let asked = &options.channels;
     let colour = match &asked.colour {
         Some(names) => all.named_optional(names)?,
         None => all
             .colour(options.view.as_deref())
-            .ok_or_else(|| ExrError::NoColour { available: all.names() })?,
+            .ok_or_else(|| ExrError::NoColour {
+                available: all.names(),
+            })?,
     };
     // The rest is looked for in the view of the colour.
-    let view = options.view.clone().or_else(|| colour.iter().flatten().find_map(|entry| entry.view.clone()));
+    let view = options
+        .view
+        .clone()
+        .or_else(|| colour.iter().flatten().find_map(|entry| entry.view.clone()));
     let in_view = view.as_deref();
     let depth = match &asked.depth {
         Some(name) => Some(all.named(name)?),
@@ -140,7 +155,10 @@ pub(super) fn choose(file: &File, options: &ExrOptions) -> Result<(Chosen, Optio
         depth: depth.map(|entry| entry.name.clone()),
         normal: normal.map(|entries| entries.map(|entry| entry.name.clone())),
         specular: specular.map(|entries| entries.map(|entry| entry.name.clone())),
-        motion: motion.map(|entries| Motion { channels: entries.map(|entry| entry.name.clone()), direction }),
+        motion: motion.map(|entries| Motion {
+            channels: entries.map(|entry| entry.name.clone()),
+            direction,
+        }),
     };
     let chosen = Chosen {
         names,
@@ -154,15 +172,44 @@ pub(super) fn choose(file: &File, options: &ExrOptions) -> Result<(Chosen, Optio
 }
 
 /// Layers that hold the finished picture.
-const PICTURE: &[&str] = &["rgba", "rgb", "beauty", "combined", "color", "colour", "main", "default", "c"];
+const PICTURE: &[&str] = &[
+    "rgba", "rgb", "beauty", "combined", "color", "colour", "main", "default", "c",
+];
 const DEPTH: &[&str] = &["depth", "zdepth", "z"];
 const NORMAL: &[&str] = &["n", "nn", "normal", "normals", "nrm", "norm"];
-const BACKWARD: &[&str] = &["back", "backward", "backwards", "previous", "prev", "vector"];
-const FORWARD: &[&str] = &["forward", "forwards", "next", "motion", "motionvector", "mv", "velocity"];
+const BACKWARD: &[&str] = &[
+    "back",
+    "backward",
+    "backwards",
+    "previous",
+    "prev",
+    "vector",
+];
+const FORWARD: &[&str] = &[
+    "forward",
+    "forwards",
+    "next",
+    "motion",
+    "motionvector",
+    "mv",
+    "velocity",
+];
 /// Layers with R, G and B that are no picture.
 const OTHER: &[&str] = &[
-    "position", "p", "uv", "st", "albedo", "mask", "matte", "id", "cryptomatte", "disparity", "disparityl",
-    "disparityr", "specularmap", "roughness",
+    "position",
+    "p",
+    "uv",
+    "st",
+    "albedo",
+    "mask",
+    "matte",
+    "id",
+    "cryptomatte",
+    "disparity",
+    "disparityl",
+    "disparityr",
+    "specularmap",
+    "roughness",
 ];
 
 /// All channels of a file.
@@ -173,24 +220,35 @@ struct Catalogue {
 
 impl Catalogue {
     fn new(file: &File) -> Self {
-        let mut views: Vec<String> =
-            file.parts.iter().flat_map(|part| part.view.iter().chain(&part.views).cloned()).collect();
+        let mut views: Vec<String> = file
+            .parts
+            .iter()
+            .flat_map(|part| part.view.iter().chain(&part.views).cloned())
+            .collect();
         views.sort();
         views.dedup();
         let mut entries = Vec::new();
         for (index, part) in file.parts.iter().enumerate() {
             for (channel, name) in part.channels.iter().enumerate() {
                 let (prefix, last) = name.rsplit_once('.').unwrap_or(("", name));
-                let layer = (part.name.split(is_separator).chain(prefix.split(is_separator)))
-                    .filter(|word| !word.is_empty() && !views.iter().any(|view| view == word))
-                    .map(str::to_lowercase)
-                    .collect();
+                let layer = (part
+                    .name
+                    .split(is_separator)
+                    .chain(prefix.split(is_separator)))
+                .filter(|word| !word.is_empty() && !views.iter().any(|view| view == word))
+                .map(str::to_lowercase)
+                .collect();
                 // A part of several views names them among the layers; the
                 // first is that of all other channels.
-                let named = prefix.split('.').find(|word| part.views.iter().any(|view| view == word));
+                let named = prefix
+                    .split('.')
+                    .find(|word| part.views.iter().any(|view| view == word));
                 let default = || part.view.clone().or_else(|| part.views.first().cloned());
                 entries.push(Entry {
-                    place: Place { part: index, channel },
+                    place: Place {
+                        part: index,
+                        channel,
+                    },
                     name: ChannelName::new(part.name.clone(), name.clone()),
                     view: named.map(str::to_owned).or_else(default),
                     layer,
@@ -203,16 +261,23 @@ impl Catalogue {
     }
 
     fn names(&self) -> Vec<String> {
-        self.entries.iter().map(|entry| entry.name.to_string()).collect()
+        self.entries
+            .iter()
+            .map(|entry| entry.name.to_string())
+            .collect()
     }
 
     fn named(&self, name: &ChannelName) -> Result<&Entry, ExrError> {
         self.entries
             .iter()
             .find(|entry| {
-                entry.name.channel == name.channel && (name.part.is_empty() || entry.name.part == name.part)
+                entry.name.channel == name.channel
+                    && (name.part.is_empty() || entry.name.part == name.part)
             })
-            .ok_or_else(|| ExrError::NoChannel { name: name.clone(), available: self.names() })
+            .ok_or_else(|| ExrError::NoChannel {
+                name: name.clone(),
+                available: self.names(),
+            })
     }
 
     fn named_all<const N: usize>(&self, names: &[ChannelName; N]) -> Result<[&Entry; N], ExrError> {
@@ -223,7 +288,10 @@ impl Catalogue {
         all_of(found).ok_or_else(|| ExrError::Malformed("it has no channels".into()))
     }
 
-    fn named_optional(&self, names: &[Option<ChannelName>; 4]) -> Result<[Option<&Entry>; 4], ExrError> {
+    fn named_optional(
+        &self,
+        names: &[Option<ChannelName>; 4],
+    ) -> Result<[Option<&Entry>; 4], ExrError> {
         let mut found = [None; 4];
         for (entry, name) in found.iter_mut().zip(names) {
             *entry = name.as_ref().map(|name| self.named(name)).transpose()?;
@@ -233,25 +301,41 @@ impl Catalogue {
 
     /// Entries of a view, or of none in particular.
     fn of<'a>(&'a self, view: Option<&'a str>) -> impl Iterator<Item = &'a Entry> {
-        self.entries.iter().filter(move |entry| match (view, &entry.view) {
-            (Some(wanted), Some(view)) => wanted == view,
-            _ => true,
-        })
+        self.entries
+            .iter()
+            .filter(move |entry| match (view, &entry.view) {
+                (Some(wanted), Some(view)) => wanted == view,
+                _ => true,
+            })
     }
 
     /// The channel of the same layer with another last name.
     fn beside(&self, entry: &Entry, last: &str) -> Option<&Entry> {
-        self.entries.iter().find(|other| other.group == entry.group && other.last == last)
+        self.entries
+            .iter()
+            .find(|other| other.group == entry.group && other.last == last)
     }
 
     fn colour<'a>(&'a self, view: Option<&'a str>) -> Option<[Option<&'a Entry>; 4]> {
         // The layer of the lowest rank, of equals the first in the file.
         self.of(view)
-            .filter(|entry| matches!(entry.last.as_str(), "r" | "g" | "b" | "y" | "red" | "green" | "blue"))
+            .filter(|entry| {
+                matches!(
+                    entry.last.as_str(),
+                    "r" | "g" | "b" | "y" | "red" | "green" | "blue"
+                )
+            })
             .filter_map(|entry| {
-                let channel = |short, long| self.beside(entry, short).or_else(|| self.beside(entry, long));
+                let channel = |short, long| {
+                    self.beside(entry, short)
+                        .or_else(|| self.beside(entry, long))
+                };
                 let alpha = channel("a", "alpha");
-                let rgb = [channel("r", "red"), channel("g", "green"), channel("b", "blue")];
+                let rgb = [
+                    channel("r", "red"),
+                    channel("g", "green"),
+                    channel("b", "blue"),
+                ];
                 let (colour, grey) = match rgb {
                     [None, None, None] => {
                         // Y beside X is a coordinate, not a brightness.
@@ -277,13 +361,20 @@ impl Catalogue {
                 let layer = entry.layer.last().map_or("", String::as_str);
                 let rank = match entry.last.as_str() {
                     // Z beside X is a coordinate.
-                    "z" if self.beside(entry, "x").is_none() && self.beside(entry, "u").is_none() => 0,
+                    "z" if self.beside(entry, "x").is_none()
+                        && self.beside(entry, "u").is_none() =>
+                    {
+                        0
+                    }
                     "depth" | "zdepth" | "distance" => 1,
                     "r" | "v" | "y" if DEPTH.contains(&layer) => 2,
                     "zback" => 3,
                     _ => return None,
                 };
-                let elsewhere = !entry.layer.iter().all(|word| word_is(word, DEPTH) || word_is(word, PICTURE));
+                let elsewhere = !entry
+                    .layer
+                    .iter()
+                    .all(|word| word_is(word, DEPTH) || word_is(word, PICTURE));
                 Some(((rank == 3, elsewhere, rank), entry))
             })
             .min_by_key(|(rank, _)| *rank)
@@ -309,7 +400,10 @@ impl Catalogue {
         let suffixes = [["u", "v"], ["x", "y"], ["r", "g"]];
         match self.vectors(view, BACKWARD, suffixes) {
             Some(found) => (Some(found), MotionDirection::Backward),
-            None => (self.vectors(view, FORWARD, suffixes), MotionDirection::Forward),
+            None => (
+                self.vectors(view, FORWARD, suffixes),
+                MotionDirection::Forward,
+            ),
         }
     }
 }
@@ -317,7 +411,9 @@ impl Catalogue {
 /// How unlikely a layer is to hold the picture.
 fn layer_rank(layer: &[String]) -> u8 {
     let any = |words: &[&str]| layer.iter().any(|word| word_is(word, words));
-    let special = [DEPTH, NORMAL, BACKWARD, FORWARD, OTHER].into_iter().any(any);
+    let special = [DEPTH, NORMAL, BACKWARD, FORWARD, OTHER]
+        .into_iter()
+        .any(any);
     match layer {
         _ if special => 3,
         [] => 0,
@@ -337,5 +433,8 @@ fn word_is(word: &str, words: &[&str]) -> bool {
 
 fn all_of<T: Copy, const N: usize>(found: [Option<T>; N]) -> Option<[T; N]> {
     let first = found.first().copied().flatten()?;
-    found.iter().all(Option::is_some).then(|| found.map(|item| item.unwrap_or(first)))
+    found
+        .iter()
+        .all(Option::is_some)
+        .then(|| found.map(|item| item.unwrap_or(first)))
 }

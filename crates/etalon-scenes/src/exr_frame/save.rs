@@ -3,21 +3,26 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use exr::prelude::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage};
+use exr::prelude::{
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer, LayerAttributes, WritableImage,
+};
 
 use super::ExrError;
 use crate::frame::Frame;
 
 /// Writes a frame as one part of float channels: `R`, `G`, `B`, `A`; `Z`, the
 /// distance along the view axis, 0 for the sky; `N.X`, `N.Y`, `N.Z`;
-/// `specularMap.R` … `A`; `back.u`, `back.v` in pixels. [`load_exr`](super::load_exr)
+/// `specularMap.R` … `A`; `back.u`, `back.v` in pixels, y up. [`load_exr`](super::load_exr)
 /// reads it back.
 ///
 /// # Errors
 /// If the images are incomplete, memory runs out or the file cannot be written.
 pub fn save_exr(frame: &Frame, path: &Path) -> Result<(), ExrError> {
     let bytes = encode_exr(frame)?;
-    std::fs::write(path, bytes).map_err(|source| ExrError::Io { path: path.display().to_string(), source })
+    std::fs::write(path, bytes).map_err(|source| ExrError::Io {
+        path: path.display().to_string(),
+        source,
+    })
 }
 
 fn encode_exr(frame: &Frame) -> Result<Vec<u8>, ExrError> {
@@ -30,12 +35,19 @@ fn encode_exr(frame: &Frame) -> Result<Vec<u8>, ExrError> {
         let texels = match image {
             Some(Ok(texels)) if texels.len() == size.pixels() => texels,
             Some(Ok(texels)) => {
-                return Err(ExrError::Encode(format!("{name} has {} of {} texels", texels.len(), size.pixels())));
+                return Err(ExrError::Encode(format!(
+                    "{name} has {} of {} texels",
+                    texels.len(),
+                    size.pixels()
+                )));
             }
             Some(Err(error)) => return Err(ExrError::Encode(error.to_string())),
             None => return Ok(()),
         };
-        let samples = texels.iter().map(|texel| map(f64::from(texel[channel])) as f32).collect();
+        let samples = texels
+            .iter()
+            .map(|texel| map(f64::from(texel[channel])) as f32)
+            .collect();
         list.push(AnyChannel::new(name, FlatSamples::F32(samples)));
         Ok(())
     };
@@ -44,12 +56,14 @@ fn encode_exr(frame: &Frame) -> Result<Vec<u8>, ExrError> {
         add(name, "colour", channel, &same)?;
         add(&format!("specularMap.{name}"), "specular", channel, &same)?;
     }
-    add("Z", "depth", 0, &|depth| if depth == 0.0 { 0.0 } else { near / depth })?;
+    add("Z", "depth", 0, &|depth| {
+        if depth == 0.0 { 0.0 } else { near / depth }
+    })?;
     for (channel, name) in ["X", "Y", "Z"].into_iter().enumerate() {
         add(&format!("N.{name}"), "normal", channel, &same)?;
     }
     add("back.u", "velocity", 0, &|x| -x * width)?;
-    add("back.v", "velocity", 1, &|x| -x * height)?;
+    add("back.v", "velocity", 1, &|x| x * height)?;
 
     let attributes = LayerAttributes {
         screen_window_width: (2.0 / frame.camera.projection.scale().x) as f32,

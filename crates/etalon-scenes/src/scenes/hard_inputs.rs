@@ -55,14 +55,15 @@ const SINGLES: [u32; 16] = [
 /// texels of each image go through all the values in turn, so that small frames
 /// have some as well.
 pub(super) fn damage(frame: &mut Frame) {
-    for (index, image) in
-        [&mut frame.colour, &mut frame.normal, &mut frame.velocity].into_iter().enumerate()
+    for (index, image) in [&mut frame.colour, &mut frame.normal, &mut frame.velocity]
+        .into_iter()
+        .enumerate()
     {
         replace::<2>(image, 1 + index as u32, |value| HALVES[value].to_le_bytes());
     }
     replace::<4>(&mut frame.depth, 4, |value| SINGLES[value].to_le_bytes());
     for (index, texel) in frame.normal.bytes.chunks_exact_mut(8).enumerate() {
-        if hash(index as u32 ^ 0x5000_0000) % (4 * RARITY) == 0 {
+        if hash(index as u32 ^ 0x5000_0000).is_multiple_of(4 * RARITY) {
             texel[..6].fill(0);
             texel[6..].copy_from_slice(&0x3c00_u16.to_le_bytes());
         }
@@ -70,7 +71,7 @@ pub(super) fn damage(frame: &mut Frame) {
     // Eight bits have no special values but their extremes.
     for (index, texel) in frame.specular.bytes.chunks_exact_mut(4).enumerate() {
         let random = hash(index as u32 ^ 0x6000_0000);
-        if random % RARITY == 0 {
+        if random.is_multiple_of(RARITY) {
             texel.fill(if random & RARITY == 0 { 0 } else { 255 });
         }
     }
@@ -83,10 +84,14 @@ fn replace<const N: usize>(image: &mut ImageData, seed: u32, special: impl Fn(us
         let random = hash(index as u32 ^ (seed << 28));
         // Spread over the first rows, and leaving most of them as they were.
         let listed = index % 3 == 0 && index / 3 < 16;
-        if !listed && random % RARITY != 0 {
+        if !listed && !random.is_multiple_of(RARITY) {
             continue;
         }
-        let value = if listed { index / 3 } else { (random >> 8) as usize % 16 };
+        let value = if listed {
+            index / 3
+        } else {
+            (random >> 8) as usize % 16
+        };
         let whole = random & (1 << 16) != 0;
         let chosen = (random >> 20) as usize % channels;
         for (channel, bytes) in texel.chunks_exact_mut(N).enumerate() {

@@ -19,19 +19,35 @@ pub const WALL_DISTANCE: f64 = 6.0;
 
 pub(super) fn build() -> Result<World, WorldError> {
     let mut scene = SceneBuilder::new();
-    scene.sky(Sky { horizon: DVec3::new(0.4, 0.5, 0.7), zenith: DVec3::new(0.1, 0.2, 0.5) });
+    scene.sky(Sky {
+        horizon: DVec3::new(0.4, 0.5, 0.7),
+        zenith: DVec3::new(0.1, 0.2, 0.5),
+    });
     // Nothing but ambient light: the wall's colour is the same from everywhere.
-    scene.ambient(Ambient { above: DVec3::ONE, below: DVec3::ONE });
+    scene.ambient(Ambient {
+        above: DVec3::ONE,
+        below: DVec3::ONE,
+    });
     scene.object(
-        Shape::Plane { point: DVec3::new(0.0, MIRROR_HEIGHT, 0.0), normal: DVec3::Y },
+        Shape::Plane {
+            point: DVec3::new(0.0, MIRROR_HEIGHT, 0.0),
+            normal: DVec3::Y,
+        },
         Material::metal(DVec3::ONE, 0.0),
     );
     scene.object(
-        Shape::Plane { point: DVec3::new(0.0, 0.0, -WALL_DISTANCE), normal: DVec3::Z },
+        Shape::Plane {
+            point: DVec3::new(0.0, 0.0, -WALL_DISTANCE),
+            normal: DVec3::Z,
+        },
         Material::matte(Property::Varying {
             low: DVec3::new(0.9, 0.35, 0.1),
             high: DVec3::new(0.05, 0.2, 0.6),
-            pattern: Pattern::Checker { origin: DVec3::ZERO, u: DVec3::X * 0.5, v: DVec3::Y * 0.5 },
+            pattern: Pattern::Checker {
+                origin: DVec3::ZERO,
+                u: DVec3::X * 0.5,
+                v: DVec3::Y * 0.5,
+            },
         }),
     );
     let camera = moving_camera(
@@ -39,5 +55,8 @@ pub(super) fn build() -> Result<World, WorldError> {
         [DVec3::new(0.0, 1.0, 1.0), DVec3::new(0.0, 0.2, -1.0)],
         60.0,
     )?;
-    Ok(World { scene: scene.build()?, camera })
+    Ok(World {
+        scene: scene.build()?,
+        camera,
+    })
 }

@@ -132,6 +132,7 @@ fn moving_camera(
     now: [glam::DVec3; 2],
     vertical_fov_degrees: f64,
 ) -> Result<Camera, CameraError> {
-    let pose = |[position, target]: [glam::DVec3; 2]| Pose::look_at(position, target, glam::DVec3::Y);
+    let pose =
+        |[position, target]: [glam::DVec3; 2]| Pose::look_at(position, target, glam::DVec3::Y);
     Ok(Camera::new(pose(now)?, vertical_fov_degrees.to_radians())?.moved_from(pose(before)?))
 }

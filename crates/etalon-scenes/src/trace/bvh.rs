@@ -21,16 +21,26 @@ struct Bounds {
 }
 
 impl Bounds {
-    const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+    const EMPTY: Self = Self {
+        low: DVec3::INFINITY,
+        high: DVec3::NEG_INFINITY,
+    };
 
     fn union(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+        Self {
+            low: self.low.min(other.low),
+            high: self.high.max(other.high),
+        }
     }
 
     /// Half the surface area: all that the heuristic compares.
     fn area(self) -> f64 {
         let e = self.high - self.low;
-        if e.min_element() < 0.0 { 0.0 } else { e.x * e.y + e.y * e.z + e.z * e.x }
+        if e.min_element() < 0.0 {
+            0.0
+        } else {
+            e.x * e.y + e.y * e.z + e.z * e.x
+        }
     }
 
     /// Where the ray enters, if that is before `limit` and it does at all.
@@ -39,7 +49,11 @@ impl Bounds {
         let b = (self.high - ray.origin()) * inverse;
         let (mut enter, mut leave) = (ray.start(), limit);
         for axis in 0..3 {
-            let (low, high) = if inverse[axis] > 0.0 { (a[axis], b[axis]) } else { (b[axis], a[axis]) };
+            let (low, high) = if inverse[axis] > 0.0 {
+                (a[axis], b[axis])
+            } else {
+                (b[axis], a[axis])
+            };
             // 0 · ∞ is NaN where the ray runs within a face of the slab; no
             // comparison with it holds, so the interval stays as it is.
             if low > enter {
@@ -84,7 +98,11 @@ impl Bvh {
     /// Bounding Volume Hierarchies”, 2007).
     pub(crate) fn new(items: impl Iterator<Item = (u32, DVec3, DVec3)>) -> Self {
         let mut items: Vec<_> = items
-            .map(|(index, low, high)| Item { index, bounds: Bounds { low, high }, center: 0.5 * (low + high) })
+            .map(|(index, low, high)| Item {
+                index,
+                bounds: Bounds { low, high },
+                center: 0.5 * (low + high),
+            })
             .collect();
         let mut bvh = Self::default();
         if !items.is_empty() {
@@ -94,10 +112,20 @@ impl Bvh {
     }
 
     fn build(&mut self, items: &mut [Item], depth: usize) {
-        let bounds = items.iter().fold(Bounds::EMPTY, |sum, item| sum.union(item.bounds));
+        let bounds = items
+            .iter()
+            .fold(Bounds::EMPTY, |sum, item| sum.union(item.bounds));
         let node = self.nodes.len();
-        self.nodes.push(Node { bounds, start: self.order.len() as u32, count: items.len() as u32 });
-        let split = if items.len() <= LEAF { None } else { Some(split(items, depth)) };
+        self.nodes.push(Node {
+            bounds,
+            start: self.order.len() as u32,
+            count: items.len() as u32,
+        });
+        let split = if items.len() <= LEAF {
+            None
+        } else {
+            Some(split(items, depth))
+        };
         match split {
             Some(middle) => {
                 let (first, second) = items.split_at_mut(middle);
@@ -113,9 +141,18 @@ impl Bvh {
     /// Calls `visit(index, limit)` for primitives the ray may hit before
     /// `limit`, near ones first, until none are left. `visit` answers with the
     /// new limit; below the ray's start it ends the search.
-    pub(crate) fn traverse(&self, ray: &Ray, mut limit: f64, mut visit: impl FnMut(u32, f64) -> f64) {
+    pub(crate) fn traverse(
+        &self,
+        ray: &Ray,
+        mut limit: f64,
+        mut visit: impl FnMut(u32, f64) -> f64,
+    ) {
         let inverse = ray.direction().recip();
-        let Some(enter) = self.nodes.first().and_then(|root| root.bounds.enter(ray, inverse, limit)) else {
+        let Some(enter) = self
+            .nodes
+            .first()
+            .and_then(|root| root.bounds.enter(ray, inverse, limit))
+        else {
             return;
         };
         let mut stack = [(0_u32, 0.0_f64); STACK];
@@ -136,7 +173,10 @@ impl Bvh {
                 continue;
             }
             let child = |index: u32| {
-                self.nodes[index as usize].bounds.enter(ray, inverse, limit).map(|enter| (index, enter))
+                self.nodes[index as usize]
+                    .bounds
+                    .enter(ray, inverse, limit)
+                    .map(|enter| (index, enter))
             };
             let (first, second) = (child(index + 1), child(node.start));
             let (near, far) = match (first, second) {
@@ -154,15 +194,18 @@ impl Bvh {
 /// Reorders the items so that the cheapest split found is at the index returned,
 /// which is neither 0 nor the length.
 fn split(items: &mut [Item], depth: usize) -> usize {
-    let spread = items
-        .iter()
-        .fold(Bounds::EMPTY, |sum, item| sum.union(Bounds { low: item.center, high: item.center }));
+    let spread = items.iter().fold(Bounds::EMPTY, |sum, item| {
+        sum.union(Bounds {
+            low: item.center,
+            high: item.center,
+        })
+    });
     let extent = spread.high - spread.low;
     let half = items.len() / 2;
     if depth < MEDIAN_DEPTH {
         let mut best = (f64::INFINITY, 0, 0);
         for axis in 0..3 {
-            if !(extent[axis] > 0.0) {
+            if extent[axis] <= 0.0 {
                 continue;
             }
             let mut bins = [(Bounds::EMPTY, 0_usize); BINS];
@@ -240,6 +283,10 @@ mod tests {
     #[test]
     fn an_empty_hierarchy_has_nothing_to_visit() {
         let bvh = Bvh::new(std::iter::empty());
-        bvh.traverse(&Ray::new(DVec3::ZERO, DVec3::Z), f64::INFINITY, |_, _| unreachable!());
+        bvh.traverse(
+            &Ray::new(DVec3::ZERO, DVec3::Z),
+            f64::INFINITY,
+            |_, _| unreachable!(),
+        );
     }
 }

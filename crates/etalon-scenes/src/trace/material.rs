@@ -64,7 +64,9 @@ impl Pattern {
                 let parity = |edge| along(offset, edge).floor().rem_euclid(2.0);
                 if parity(u) == parity(v) { 0.0 } else { 1.0 }
             }
-            Self::Stripes { origin, across } => along(position - origin, across).floor().rem_euclid(2.0),
+            Self::Stripes { origin, across } => {
+                along(position - origin, across).floor().rem_euclid(2.0)
+            }
             Self::Grid { origin, u, v, line } => {
                 let offset = position - origin;
                 let near = |edge| {
@@ -73,7 +75,13 @@ impl Pattern {
                 };
                 if near(u) || near(v) { 1.0 } else { 0.0 }
             }
-            Self::Patches { u, v, low, high, seed } => {
+            Self::Patches {
+                u,
+                v,
+                low,
+                high,
+                seed,
+            } => {
                 let (x, y) = (along(position, u), along(position, v));
                 let mut sum = 0.0;
                 for octave in 0..3_u32 {
@@ -173,7 +181,12 @@ impl Material {
     /// A matte material that reflects nothing.
     #[must_use]
     pub fn matte(base: impl Into<Property<DVec3>>) -> Self {
-        Self { base: base.into(), specular: DVec3::ZERO.into(), roughness: 1.0.into(), emission: DVec3::ZERO }
+        Self {
+            base: base.into(),
+            specular: DVec3::ZERO.into(),
+            roughness: 1.0.into(),
+            emission: DVec3::ZERO,
+        }
     }
 
     /// A dielectric with the usual 4 % reflectance.
@@ -201,7 +214,10 @@ impl Material {
     /// A black surface that gives off light.
     #[must_use]
     pub fn light(emission: DVec3) -> Self {
-        Self { emission, ..Self::matte(DVec3::ZERO) }
+        Self {
+            emission,
+            ..Self::matte(DVec3::ZERO)
+        }
     }
 }
 
@@ -211,8 +227,17 @@ mod tests {
 
     #[test]
     fn checkers_alternate_on_both_sides_of_the_origin() {
-        let checker = Pattern::Checker { origin: DVec3::ZERO, u: DVec3::X * 0.5, v: DVec3::Z * 0.5 };
-        for (x, z, value) in [(0.1, 0.1, 0.0), (0.6, 0.1, 1.0), (-0.1, 0.1, 1.0), (-0.1, -0.1, 0.0)] {
+        let checker = Pattern::Checker {
+            origin: DVec3::ZERO,
+            u: DVec3::X * 0.5,
+            v: DVec3::Z * 0.5,
+        };
+        for (x, z, value) in [
+            (0.1, 0.1, 0.0),
+            (0.6, 0.1, 1.0),
+            (-0.1, 0.1, 1.0),
+            (-0.1, -0.1, 0.0),
+        ] {
             // The height does not matter, however little it is off the plane.
             for y in [0.0, 1e-300, -1e-17, 7.0] {
                 assert_eq!(checker.at(DVec3::new(x, y, z)), value, "at {x}, {y}, {z}");
@@ -222,7 +247,13 @@ mod tests {
 
     #[test]
     fn patches_are_smooth_and_in_range() {
-        let patches = Pattern::Patches { u: DVec3::X, v: DVec3::Z, low: 0.3, high: 0.7, seed: 1 };
+        let patches = Pattern::Patches {
+            u: DVec3::X,
+            v: DVec3::Z,
+            low: 0.3,
+            high: 0.7,
+            seed: 1,
+        };
         let (mut least, mut most) = (1.0_f64, 0.0_f64);
         for i in 0..10_000 {
             let x = f64::from(i) * 1e-2;

@@ -6,6 +6,7 @@
 //! ray really meets and whether the screen could have known.
 
 mod bvh;
+mod check;
 mod material;
 mod primitive;
 mod ray;

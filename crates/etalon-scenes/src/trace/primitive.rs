@@ -10,14 +10,38 @@ use super::ray::Ray;
 /// One convex piece of a scene.
 #[derive(Clone, Debug)]
 pub(crate) enum Primitive {
-    Plane { point: DVec3, normal: DVec3 },
+    Plane {
+        point: DVec3,
+        normal: DVec3,
+    },
     /// `inverse_u`, `inverse_v`: `half / |half|²`, so that dot products with
     /// them are coordinates in `[-1, 1]`.
-    Rectangle { center: DVec3, half_u: DVec3, half_v: DVec3, inverse_u: DVec3, inverse_v: DVec3, normal: DVec3 },
-    Disc { center: DVec3, normal: DVec3, radius: f64 },
-    Sphere { center: DVec3, radius: f64 },
-    Box { center: DVec3, half: DVec3, orientation: DMat3 },
-    Triangle { corners: [DVec3; 3], normal: DVec3 },
+    Rectangle {
+        center: DVec3,
+        half_u: DVec3,
+        half_v: DVec3,
+        inverse_u: DVec3,
+        inverse_v: DVec3,
+        normal: DVec3,
+    },
+    Disc {
+        center: DVec3,
+        normal: DVec3,
+        radius: f64,
+    },
+    Sphere {
+        center: DVec3,
+        radius: f64,
+    },
+    Box {
+        center: DVec3,
+        half: DVec3,
+        orientation: DMat3,
+    },
+    Triangle {
+        corners: [DVec3; 3],
+        normal: DVec3,
+    },
 }
 
 /// Where a ray meets a primitive.
@@ -36,17 +60,35 @@ impl Primitive {
         let around = |center: DVec3, reach: DVec3| Some((center - reach, center + reach));
         match *self {
             Self::Plane { .. } => None,
-            Self::Rectangle { center, half_u, half_v, .. } => around(center, half_u.abs() + half_v.abs()),
+            Self::Rectangle {
+                center,
+                half_u,
+                half_v,
+                ..
+            } => around(center, half_u.abs() + half_v.abs()),
             // The extent of a disc along an axis is the sine of the angle between axis and normal.
-            Self::Disc { center, normal, radius } => {
-                let sine = (DVec3::ONE - normal * normal).max(DVec3::ZERO).map(f64::sqrt);
+            Self::Disc {
+                center,
+                normal,
+                radius,
+            } => {
+                let sine = (DVec3::ONE - normal * normal)
+                    .max(DVec3::ZERO)
+                    .map(f64::sqrt);
                 around(center, sine * radius)
             }
             Self::Sphere { center, radius } => around(center, DVec3::splat(radius)),
-            Self::Box { center, half, orientation: r } => {
-                around(center, r.x_axis.abs() * half.x + r.y_axis.abs() * half.y + r.z_axis.abs() * half.z)
-            }
-            Self::Triangle { corners: [a, b, c], .. } => Some((a.min(b).min(c), a.max(b).max(c))),
+            Self::Box {
+                center,
+                half,
+                orientation: r,
+            } => around(
+                center,
+                r.x_axis.abs() * half.x + r.y_axis.abs() * half.y + r.z_axis.abs() * half.z,
+            ),
+            Self::Triangle {
+                corners: [a, b, c], ..
+            } => Some((a.min(b).min(c), a.max(b).max(c))),
         }
     }
 
@@ -54,17 +96,29 @@ impl Primitive {
     pub(crate) fn meet(&self, ray: &Ray, left: Option<u8>, limit: f64) -> Option<Meeting> {
         let meeting = match *self {
             Self::Sphere { center, radius } => sphere(ray, left.is_some(), center, radius),
-            Self::Box { center, half, orientation } => oriented_box(ray, left, center, half, &orientation),
+            Self::Box {
+                center,
+                half,
+                orientation,
+            } => oriented_box(ray, left, center, half, &orientation),
             // A ray that starts on a plane never meets it again.
             _ if left.is_some() => None,
             Self::Plane { point, normal } => plane(ray, point, normal),
-            Self::Rectangle { center, inverse_u, inverse_v, normal, .. } => {
-                plane(ray, center, normal).filter(|meeting| {
-                    let offset = meeting.position - center;
-                    offset.dot(inverse_u).abs() <= 1.0 && offset.dot(inverse_v).abs() <= 1.0
-                })
-            }
-            Self::Disc { center, normal, radius } => plane(ray, center, normal)
+            Self::Rectangle {
+                center,
+                inverse_u,
+                inverse_v,
+                normal,
+                ..
+            } => plane(ray, center, normal).filter(|meeting| {
+                let offset = meeting.position - center;
+                offset.dot(inverse_u).abs() <= 1.0 && offset.dot(inverse_v).abs() <= 1.0
+            }),
+            Self::Disc {
+                center,
+                normal,
+                radius,
+            } => plane(ray, center, normal)
                 .filter(|meeting| meeting.position.distance_squared(center) <= radius * radius),
             Self::Triangle { corners, normal } => triangle(ray, &corners, normal),
         }?;
@@ -82,7 +136,12 @@ fn plane(ray: &Ray, point: DVec3, normal: DVec3) -> Option<Meeting> {
     let reached = ray.at(t);
     // The rounding error of `reached` grows with t; take out its part across the plane.
     let position = reached - normal * normal.dot(reached - point);
-    Some(Meeting { t, position, normal, face: 0 })
+    Some(Meeting {
+        t,
+        position,
+        normal,
+        face: 0,
+    })
 }
 
 /// The roots after Haines, Günther and Akenine-Möller, “Precision Improvements
@@ -102,7 +161,8 @@ fn sphere(ray: &Ray, on_surface: bool, center: DVec3, radius: f64) -> Option<Mee
         let closest = f + d * (b / a);
         let offset = closest.length();
         let discriminant = (radius - offset) * (radius + offset);
-        if !(discriminant >= 0.0) {
+        // A NaN goes on to the test of t below.
+        if discriminant < 0.0 {
             return None;
         }
         let distance = f.length();
@@ -116,7 +176,12 @@ fn sphere(ray: &Ray, on_surface: bool, center: DVec3, radius: f64) -> Option<Mee
         return None;
     }
     let normal = (ray.at(t) - center).try_normalize()?;
-    Some(Meeting { t, position: center + normal * radius, normal, face: 0 })
+    Some(Meeting {
+        t,
+        position: center + normal * radius,
+        normal,
+        face: 0,
+    })
 }
 
 /// Slabs in the box's own axes (Kay and Kajiya 1986).
@@ -209,5 +274,10 @@ fn triangle(ray: &Ray, corners: &[DVec3; 3], normal: DVec3) -> Option<Meeting> {
         return None;
     }
     let position = corners[0] * (u / det) + corners[1] * (v / det) + corners[2] * (w / det);
-    Some(Meeting { t, position, normal, face: 0 })
+    Some(Meeting {
+        t,
+        position,
+        normal,
+        face: 0,
+    })
 }

@@ -15,7 +15,12 @@ impl Ray {
     /// A ray in any direction; parameters `t` are in units of its length.
     #[must_use]
     pub const fn new(origin: DVec3, direction: DVec3) -> Self {
-        Self { origin, direction, start: 0.0, from: None }
+        Self {
+            origin,
+            direction,
+            start: 0.0,
+            from: None,
+        }
     }
 
     /// The same ray with hits only beyond `t`.
@@ -34,7 +39,10 @@ impl Ray {
     /// or box meets its far side: that is a different root or face and is kept.
     #[must_use]
     pub const fn leaving(self, surface: SurfaceId) -> Self {
-        Self { from: Some(surface), ..self }
+        Self {
+            from: Some(surface),
+            ..self
+        }
     }
 
     /// Where it starts.
@@ -63,7 +71,9 @@ impl Ray {
 
     /// The face of `primitive` that the ray leaves, if it leaves that one.
     pub(crate) fn face_left(&self, primitive: u32) -> Option<u8> {
-        self.from.filter(|from| from.primitive == primitive).map(|from| from.face)
+        self.from
+            .filter(|from| from.primitive == primitive)
+            .map(|from| from.face)
     }
 }
 

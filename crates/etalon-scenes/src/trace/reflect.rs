@@ -63,7 +63,8 @@ impl Reflection {
         if x >= self.size.width() || y >= self.size.height() {
             return None;
         }
-        self.rays.get(y as usize * self.size.width() as usize + x as usize)
+        self.rays
+            .get(y as usize * self.size.width() as usize + x as usize)
     }
 }
 
@@ -74,19 +75,30 @@ impl Reflection {
 ///
 /// # Errors
 /// If the camera has no projection for the size, or memory runs out.
-pub fn true_reflection(scene: &Scene, camera: &Camera, size: FrameSize) -> Result<Reflection, FrameError> {
-    let mirror = Mirror { scene, camera, projection: camera.projection(size)? };
+pub fn true_reflection(
+    scene: &Scene,
+    camera: &Camera,
+    size: FrameSize,
+) -> Result<Reflection, FrameError> {
+    let mirror = Mirror {
+        scene,
+        camera,
+        projection: camera.projection(size)?,
+    };
     let mut rays = Vec::new();
-    rays.try_reserve_exact(size.pixels()).map_err(|_| FrameError::OutOfMemory {
-        what: "reflection",
-        bytes: size.pixels() as u64 * size_of::<MirrorRay>() as u64,
-    })?;
+    rays.try_reserve_exact(size.pixels())
+        .map_err(|_| FrameError::OutOfMemory {
+            what: "reflection",
+            bytes: size.pixels() as u64 * size_of::<MirrorRay>() as u64,
+        })?;
     rays.resize(size.pixels(), MirrorRay::None);
-    rays.par_chunks_exact_mut(size.width() as usize).enumerate().for_each(|(y, row)| {
-        for (x, ray) in row.iter_mut().enumerate() {
-            *ray = mirror.ray(pixel_centre(x as u32, y as u32, size));
-        }
-    });
+    rays.par_chunks_exact_mut(size.width() as usize)
+        .enumerate()
+        .for_each(|(y, row)| {
+            for (x, ray) in row.iter_mut().enumerate() {
+                *ray = mirror.ray(pixel_centre(x as u32, y as u32, size));
+            }
+        });
     Ok(Reflection { size, rays })
 }
 
@@ -117,7 +129,11 @@ impl Mirror<'_> {
         let uv = self
             .projection
             .project(position)
-            .filter(|seen| seen.depth <= 1.0 && seen.uv.cmpge(DVec2::ZERO).all() && seen.uv.cmple(DVec2::ONE).all())
+            .filter(|seen| {
+                seen.depth <= 1.0
+                    && seen.uv.cmpge(DVec2::ZERO).all()
+                    && seen.uv.cmple(DVec2::ONE).all()
+            })
             .map(|seen| seen.uv);
         let to_camera = self.camera.pose().position() - hit.position;
         let distance = to_camera.length();

@@ -25,14 +25,33 @@ pub fn trace(scene: &Scene, camera: &Camera, size: FrameSize) -> Result<Frame, F
     let parameters = FrameCamera::new(camera, size)?;
     let mut frame = Frame::empty(parameters, size)?;
     let width = size.width() as usize;
-    let view = View { scene, camera, projection: parameters.projection };
+    let view = View {
+        scene,
+        camera,
+        projection: parameters.projection,
+    };
     let row = |format: Format| width * format.texel_bytes() as usize;
     (
-        frame.colour.bytes.par_chunks_exact_mut(row(frame.colour.desc.format)),
-        frame.depth.bytes.par_chunks_exact_mut(row(frame.depth.desc.format)),
-        frame.normal.bytes.par_chunks_exact_mut(row(frame.normal.desc.format)),
-        frame.specular.bytes.par_chunks_exact_mut(row(frame.specular.desc.format)),
-        frame.velocity.bytes.par_chunks_exact_mut(row(frame.velocity.desc.format)),
+        frame
+            .colour
+            .bytes
+            .par_chunks_exact_mut(row(frame.colour.desc.format)),
+        frame
+            .depth
+            .bytes
+            .par_chunks_exact_mut(row(frame.depth.desc.format)),
+        frame
+            .normal
+            .bytes
+            .par_chunks_exact_mut(row(frame.normal.desc.format)),
+        frame
+            .specular
+            .bytes
+            .par_chunks_exact_mut(row(frame.specular.desc.format)),
+        frame
+            .velocity
+            .bytes
+            .par_chunks_exact_mut(row(frame.velocity.desc.format)),
     )
         .into_par_iter()
         .enumerate()
@@ -43,7 +62,12 @@ pub fn trace(scene: &Scene, camera: &Camera, size: FrameSize) -> Result<Frame, F
                 store(Format::R32Float, depth, x, [pixel.depth, 0.0, 0.0, 0.0]);
                 store(Format::Rgba16Float, normal, x, pixel.normal);
                 store(Format::Rgba8Unorm, specular, x, pixel.specular);
-                store(Format::Rg16Float, velocity, x, [pixel.velocity.x, pixel.velocity.y, 0.0, 0.0]);
+                store(
+                    Format::Rg16Float,
+                    velocity,
+                    x,
+                    [pixel.velocity.x, pixel.velocity.y, 0.0, 0.0],
+                );
             }
         });
     Ok(frame)
@@ -51,12 +75,18 @@ pub fn trace(scene: &Scene, camera: &Camera, size: FrameSize) -> Result<Frame, F
 
 /// The uv of a pixel's centre.
 pub(crate) fn pixel_centre(x: u32, y: u32, size: FrameSize) -> DVec2 {
-    DVec2::new((f64::from(x) + 0.5) / f64::from(size.width()), (f64::from(y) + 0.5) / f64::from(size.height()))
+    DVec2::new(
+        (f64::from(x) + 0.5) / f64::from(size.width()),
+        (f64::from(y) + 0.5) / f64::from(size.height()),
+    )
 }
 
 fn store(format: Format, row: &mut [u8], x: usize, value: [f64; 4]) {
     let bytes = format.texel_bytes() as usize;
-    format.encode(Texel::Float(value.map(|channel| channel as f32)), &mut row[x * bytes..][..bytes]);
+    format.encode(
+        Texel::Float(value.map(|channel| channel as f32)),
+        &mut row[x * bytes..][..bytes],
+    );
 }
 
 /// All that one pixel of a frame holds.
@@ -82,8 +112,15 @@ impl View<'_> {
         match self.scene.intersect(&ray) {
             Some(hit) => self.surface(uv, &hit, -ray.direction()),
             None => Pixel {
-                colour: stored(self.scene.sky().at(ray.direction())).extend(0.0).to_array(),
-                velocity: self.velocity(uv, self.camera.previous_pose().direction_to_view(ray.direction())),
+                colour: stored(self.scene.sky().at(ray.direction()))
+                    .extend(0.0)
+                    .to_array(),
+                velocity: self.velocity(
+                    uv,
+                    self.camera
+                        .previous_pose()
+                        .direction_to_view(ray.direction()),
+                ),
                 ..Pixel::default()
             },
         }
@@ -93,9 +130,16 @@ impl View<'_> {
         let surface = Surface::new(self.scene.material(hit), hit.position);
         let view = self.camera.pose().to_view(hit.position);
         Pixel {
-            colour: stored(shade::radiance(self.scene, hit, &surface, out)).extend(1.0).to_array(),
+            colour: stored(shade::radiance(self.scene, hit, &surface, out))
+                .extend(1.0)
+                .to_array(),
             depth: self.projection.near() / -view.z,
-            normal: self.camera.pose().direction_to_view(hit.normal).extend(1.0).to_array(),
+            normal: self
+                .camera
+                .pose()
+                .direction_to_view(hit.normal)
+                .extend(1.0)
+                .to_array(),
             specular: surface.specular.extend(1.0 - surface.roughness).to_array(),
             velocity: self.velocity(uv, self.camera.previous_pose().to_view(hit.position)),
         }
@@ -104,7 +148,9 @@ impl View<'_> {
     /// How far the picture moved at `uv` since the view position, or direction,
     /// was at `previous`. 0 for what was behind the eye: it was not in the picture.
     fn velocity(&self, uv: DVec2, previous: DVec3) -> DVec2 {
-        self.projection.project(previous).map_or(DVec2::ZERO, |before| uv - before.uv)
+        self.projection
+            .project(previous)
+            .map_or(DVec2::ZERO, |before| uv - before.uv)
     }
 }
 

@@ -4,6 +4,7 @@ use glam::DVec3;
 use thiserror::Error;
 
 use super::bvh::Bvh;
+use super::check::{Check, split};
 use super::material::Material;
 use super::primitive::Primitive;
 use super::ray::{Hit, Ray, SurfaceId};
@@ -86,7 +87,9 @@ pub enum SceneError {
         need: &'static str,
     },
     /// A triangle refers to a corner its mesh does not have.
-    #[error("triangle {triangle} of object {object} refers to corner {corner}, but the mesh has {corners}")]
+    #[error(
+        "triangle {triangle} of object {object} refers to corner {corner}, but the mesh has {corners}"
+    )]
     Corner {
         /// The object's place in the order they were added.
         object: usize,
@@ -137,7 +140,11 @@ impl SceneBuilder {
         self.object(Shape::Sphere { center, radius }, Material::light(radiance));
         let intensity = radiance * (std::f64::consts::PI * radius * radius);
         // A little more than the body, whose points are at the radius only up to rounding.
-        self.light(Light::Point { position: center, intensity, body: radius * 1.001 })
+        self.light(Light::Point {
+            position: center,
+            intensity,
+            body: radius * 1.001,
+        })
     }
 
     /// Sets the light from everywhere.
@@ -169,26 +176,40 @@ impl SceneBuilder {
             owners.resize(primitives.len(), index as u32);
         }
         for (index, light) in self.lights.iter().enumerate() {
-            let check = Check { which: "light", index };
+            let check = Check {
+                which: "light",
+                index,
+            };
             match *light {
-                Light::Directional { towards, irradiance } => {
+                Light::Directional {
+                    towards,
+                    irradiance,
+                } => {
                     check.direction("direction", towards)?;
                     check.finite("irradiance", irradiance)?;
                 }
-                Light::Point { position, intensity, body } => {
+                Light::Point {
+                    position,
+                    intensity,
+                    body,
+                } => {
                     check.finite("position", position)?;
                     check.finite("intensity", intensity)?;
                     check.number("body radius", body, "finite and not negative", |x| x >= 0.0)?;
                 }
             }
         }
-        let bounded = primitives.iter().enumerate().filter_map(|(index, primitive)| {
-            let (low, high) = primitive.bounds()?;
-            // Intersections are exact to some units in the last place of the
-            // coordinates involved; boxes are wider than that by far.
-            let margin = DVec3::splat(1e-9 * (low.abs().max_element() + high.abs().max_element()));
-            Some((index as u32, low - margin, high + margin))
-        });
+        let bounded = primitives
+            .iter()
+            .enumerate()
+            .filter_map(|(index, primitive)| {
+                let (low, high) = primitive.bounds()?;
+                // Intersections are exact to some units in the last place of the
+                // coordinates involved; boxes are wider than that by far.
+                let margin =
+                    DVec3::splat(1e-9 * (low.abs().max_element() + high.abs().max_element()));
+                Some((index as u32, low - margin, high + margin))
+            });
         let bvh = Bvh::new(bounded);
         let endless = (0_u32..)
             .zip(&primitives)
@@ -247,9 +268,8 @@ impl Scene {
         self.sky
     }
 
-    /// The material of the object that was hit.
-    #[must_use]
-    pub fn material(&self, hit: &Hit) -> &Material {
+    /// The material of the object that was hit by a ray in this scene.
+    pub(crate) fn material(&self, hit: &Hit) -> &Material {
         &self.objects[hit.object as usize].material
     }
 
@@ -284,7 +304,9 @@ impl Scene {
     pub fn occluded(&self, ray: &Ray, end: f64) -> bool {
         let hits = |index: u32| {
             let left = ray.face_left(index);
-            self.primitives[index as usize].meet(ray, left, end).is_some_and(|meeting| meeting.t < end)
+            self.primitives[index as usize]
+                .meet(ray, left, end)
+                .is_some_and(|meeting| meeting.t < end)
         };
         if self.endless.iter().any(|&index| hits(index)) {
             return true;
@@ -315,121 +337,31 @@ impl Nearest {
     }
 
     fn offer(&mut self, scene: &Scene, ray: &Ray, index: u32) {
-        let Some(meeting) = scene.primitives[index as usize].meet(ray, ray.face_left(index), self.limit())
+        let Some(meeting) =
+            scene.primitives[index as usize].meet(ray, ray.face_left(index), self.limit())
         else {
             return;
         };
-        if self.hit.is_some_and(|hit| meeting.t == hit.t && hit.surface.primitive < index) {
+        if self
+            .hit
+            .is_some_and(|hit| meeting.t == hit.t && hit.surface.primitive < index)
+        {
             return;
         }
-        let towards = if meeting.normal.dot(ray.direction()) > 0.0 { -1.0 } else { 1.0 };
+        let towards = if meeting.normal.dot(ray.direction()) > 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         self.hit = Some(Hit {
             t: meeting.t,
             position: meeting.position,
             normal: meeting.normal * towards,
             object: scene.owners[index as usize],
-            surface: SurfaceId { primitive: index, face: meeting.face },
+            surface: SurfaceId {
+                primitive: index,
+                face: meeting.face,
+            },
         });
-    }
-}
-
-/// Cuts a shape into primitives, after checking it.
-fn split(index: usize, shape: &Shape, primitives: &mut Vec<Primitive>) -> Result<(), SceneError> {
-    let check = Check { which: "object", index };
-    let positive = |what, x| check.number(what, x, "finite and over 0", |x| x > 0.0);
-    primitives.push(match *shape {
-        Shape::Plane { point, normal } => {
-            check.finite("point", point)?;
-            Primitive::Plane { point, normal: check.direction("normal", normal)? }
-        }
-        Shape::Rectangle { center, half_u, half_v } => {
-            check.finite("center", center)?;
-            let u = check.direction("half_u", half_u)?;
-            let v = check.direction("half_v", half_v)?;
-            check.number("cosine between half_u and half_v", u.dot(v), "0: a right angle", |x| x.abs() < 1e-9)?;
-            Primitive::Rectangle {
-                center,
-                half_u,
-                half_v,
-                inverse_u: half_u / half_u.length_squared(),
-                inverse_v: half_v / half_v.length_squared(),
-                normal: u.cross(v).normalize(),
-            }
-        }
-        Shape::Disc { center, normal, radius } => {
-            check.finite("center", center)?;
-            positive("radius", radius)?;
-            Primitive::Disc { center, normal: check.direction("normal", normal)?, radius }
-        }
-        Shape::Sphere { center, radius } => {
-            check.finite("center", center)?;
-            positive("radius", radius)?;
-            Primitive::Sphere { center, radius }
-        }
-        Shape::Box { center, half, orientation } => {
-            check.finite("center", center)?;
-            for axis in 0..3 {
-                positive("half edge", half[axis])?;
-            }
-            let error = orientation.transpose() * orientation - glam::DMat3::IDENTITY;
-            let error = error.to_cols_array().into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-            let error = if orientation.is_finite() { error } else { f64::NAN };
-            check.number("orientation's distance from a rotation", error, "0", |x| x < 1e-9)?;
-            Primitive::Box { center, half, orientation }
-        }
-        Shape::Mesh(ref mesh) => {
-            for &position in &mesh.positions {
-                check.finite("corner", position)?;
-            }
-            for (triangle, corners) in mesh.triangles.iter().enumerate() {
-                let corner = |corner: u32| {
-                    mesh.positions.get(corner as usize).copied().ok_or(SceneError::Corner {
-                        object: index,
-                        triangle,
-                        corner,
-                        corners: mesh.positions.len(),
-                    })
-                };
-                let corners = [corner(corners[0])?, corner(corners[1])?, corner(corners[2])?];
-                let area = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
-                // A triangle without area has no normal, and no ray can hit it.
-                if let Some(normal) = area.try_normalize() {
-                    primitives.push(Primitive::Triangle { corners, normal });
-                }
-            }
-            return Ok(());
-        }
-    });
-    Ok(())
-}
-
-/// Names the object or light whose numbers are checked.
-struct Check {
-    which: &'static str,
-    index: usize,
-}
-
-impl Check {
-    fn error(&self, what: &'static str, value: impl ToString, need: &'static str) -> SceneError {
-        SceneError::Value { which: self.which, index: self.index, what, value: value.to_string(), need }
-    }
-
-    fn finite(&self, what: &'static str, value: DVec3) -> Result<(), SceneError> {
-        if value.is_finite() { Ok(()) } else { Err(self.error(what, value, "finite")) }
-    }
-
-    fn direction(&self, what: &'static str, value: DVec3) -> Result<DVec3, SceneError> {
-        self.finite(what, value)?;
-        value.try_normalize().ok_or_else(|| self.error(what, value, "longer than 0"))
-    }
-
-    fn number(
-        &self,
-        what: &'static str,
-        value: f64,
-        need: &'static str,
-        holds: impl Fn(f64) -> bool,
-    ) -> Result<(), SceneError> {
-        if value.is_finite() && holds(value) { Ok(()) } else { Err(self.error(what, value, need)) }
     }
 }

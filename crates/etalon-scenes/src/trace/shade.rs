@@ -52,14 +52,25 @@ pub(crate) fn radiance(scene: &Scene, hit: &Hit, surface: &Surface, out: DVec3) 
     let mut sum = surface.emission + surface.base * from_everywhere;
     for light in scene.lights() {
         let (towards, irradiance, end) = match *light {
-            Light::Directional { towards, irradiance } => (towards.normalize(), irradiance, f64::INFINITY),
-            Light::Point { position, intensity, body } => {
+            Light::Directional {
+                towards,
+                irradiance,
+            } => (towards.normalize(), irradiance, f64::INFINITY),
+            Light::Point {
+                position,
+                intensity,
+                body,
+            } => {
                 let offset = position - hit.position;
                 let distance = offset.length();
                 if distance <= body {
                     continue;
                 }
-                (offset / distance, intensity / (distance * distance), distance - body)
+                (
+                    offset / distance,
+                    intensity / (distance * distance),
+                    distance - body,
+                )
             }
         };
         let cosine = n.dot(towards);
@@ -85,8 +96,13 @@ fn reflected(surface: &Surface, n: DVec3, out: DVec3, towards: DVec3) -> DVec3 {
     let visibility = 0.5 / (smith(nl, nv) + smith(nv, nl));
     let grazing = 1.0 - out.dot(h).clamp(0.0, 1.0);
     let grazing2 = grazing * grazing;
-    let fresnel = surface.specular + (DVec3::ONE - surface.specular) * (grazing2 * grazing2 * grazing);
+    let fresnel =
+        surface.specular + (DVec3::ONE - surface.specular) * (grazing2 * grazing2 * grazing);
     // A black specular colour means no specular layer, not a layer seen at grazing angles only.
-    let fresnel = if surface.reflects() { fresnel } else { DVec3::ZERO };
+    let fresnel = if surface.reflects() {
+        fresnel
+    } else {
+        DVec3::ZERO
+    };
     surface.base * (DVec3::ONE - fresnel) / PI + fresnel * (distribution * visibility)
 }

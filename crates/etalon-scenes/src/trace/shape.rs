@@ -55,13 +55,21 @@ impl Shape {
     /// A box with edges along the world's axes.
     #[must_use]
     pub const fn aligned_box(center: DVec3, half: DVec3) -> Self {
-        Self::Box { center, half, orientation: DMat3::IDENTITY }
+        Self::Box {
+            center,
+            half,
+            orientation: DMat3::IDENTITY,
+        }
     }
 
     /// A box turned about the vertical through its middle, `angle` in radians.
     #[must_use]
     pub fn turned_box(center: DVec3, half: DVec3, angle: f64) -> Self {
-        Self::Box { center, half, orientation: DMat3::from_rotation_y(angle) }
+        Self::Box {
+            center,
+            half,
+            orientation: DMat3::from_rotation_y(angle),
+        }
     }
 }
 
@@ -81,7 +89,12 @@ impl Mesh {
         let golden = 0.5 * (1.0 + 5.0_f64.sqrt());
         let scale = radius / (1.0 + golden * golden).sqrt();
         let mut positions = Vec::with_capacity(12);
-        for (a, b) in [(-1.0, -golden), (1.0, -golden), (-1.0, golden), (1.0, golden)] {
+        for (a, b) in [
+            (-1.0, -golden),
+            (1.0, -golden),
+            (-1.0, golden),
+            (1.0, golden),
+        ] {
             positions.push(center + DVec3::new(a, b, 0.0) * scale);
             positions.push(center + DVec3::new(0.0, a, b) * scale);
             positions.push(center + DVec3::new(b, 0.0, a) * scale);
@@ -100,13 +113,18 @@ impl Mesh {
                 }
             }
         }
-        Self { positions, triangles }
+        Self {
+            positions,
+            triangles,
+        }
     }
 
     /// A tube of circular section around a (2, 3) torus knot standing on its
-    /// side: `around` steps along the knot, `across` around the tube.
+    /// side: `around` steps along the knot, `across` around the tube, of either
+    /// at most 4096.
     #[must_use]
     pub fn knot(center: DVec3, size: f64, tube: f64, around: u32, across: u32) -> Self {
+        let (around, across) = (around.min(4096), across.min(4096));
         let turn = std::f64::consts::TAU;
         let point = |s: f64| {
             let (p, q) = (2.0 * turn * s, 3.0 * turn * s);
@@ -120,7 +138,9 @@ impl Mesh {
             let tangent = (point(s + step) - point(s - step)).normalize_or(DVec3::X);
             // The direction from the knot's axis varies smoothly and is never
             // along the curve, so the frame does not twist suddenly.
-            let outward = (point(s) - center).reject_from_normalized(tangent).normalize_or(DVec3::Y);
+            let outward = (point(s) - center)
+                .reject_from_normalized(tangent)
+                .normalize_or(DVec3::Y);
             let side = tangent.cross(outward);
             for j in 0..across {
                 let (sin, cos) = (turn * f64::from(j) / f64::from(across)).sin_cos();
@@ -131,11 +151,19 @@ impl Mesh {
         for i in 0..around {
             for j in 0..across {
                 let index = |i: u32, j: u32| (i % around) * across + j % across;
-                let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
+                let (a, b, c, d) = (
+                    index(i, j),
+                    index(i + 1, j),
+                    index(i + 1, j + 1),
+                    index(i, j + 1),
+                );
                 triangles.push([a, b, c]);
                 triangles.push([a, c, d]);
             }
         }
-        Self { positions, triangles }
+        Self {
+            positions,
+            triangles,
+        }
     }
 }

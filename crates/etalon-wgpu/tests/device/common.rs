@@ -1,9 +1,7 @@
 //! Devices, kernels and images that the tests share.
 
-#![allow(dead_code, reason = "each test file uses some of it")]
-
 use etalon_core::Format;
-use etalon_core::backend::{Backend, BackendError, Execution, Inputs};
+use etalon_core::backend::{Backend, BackendError, CapturedData, Execution, Inputs};
 use etalon_core::format::SampleKind;
 use etalon_core::graph::Graph;
 use etalon_core::image::ImageData;
@@ -14,7 +12,7 @@ use etalon_wgpu::{WgpuBackend, WgpuOptions, wgpu};
 
 /// A way from a plan to a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Route {
+pub(crate) enum Route {
     /// Vulkan, with SPIR-V handed through.
     Vulkan,
     /// Vulkan, with kernels translated by wgpu.
@@ -23,10 +21,10 @@ pub enum Route {
     Gl,
 }
 
-pub const ROUTES: [Route; 3] = [Route::Vulkan, Route::Translated, Route::Gl];
+pub(crate) const ROUTES: [Route; 3] = [Route::Vulkan, Route::Translated, Route::Gl];
 
 impl Route {
-    pub fn options(self) -> WgpuOptions {
+    pub(crate) fn options(self) -> WgpuOptions {
         WgpuOptions {
             backends: match self {
                 Self::Gl => wgpu::Backends::GL,
@@ -46,7 +44,7 @@ fn required() -> bool {
 }
 
 /// Opens a device, or says why there is none.
-pub fn open(route: Route) -> Option<WgpuBackend> {
+pub(crate) fn open(route: Route) -> Option<WgpuBackend> {
     match WgpuBackend::new(&route.options()) {
         Ok(backend) => Some(backend),
         Err(error @ BackendError::NoDevice { .. }) => {
@@ -60,7 +58,7 @@ pub fn open(route: Route) -> Option<WgpuBackend> {
 }
 
 /// Runs a test on Vulkan, both ways.
-pub fn on_vulkan(test: impl Fn(&mut WgpuBackend)) {
+pub(crate) fn on_vulkan(test: impl Fn(&mut WgpuBackend)) {
     for route in [Route::Vulkan, Route::Translated] {
         if let Some(mut backend) = open(route) {
             println!("{route:?}: {}", backend.info());
@@ -70,7 +68,7 @@ pub fn on_vulkan(test: impl Fn(&mut WgpuBackend)) {
 }
 
 /// Runs a test on every route.
-pub fn everywhere(test: impl Fn(Route, &mut WgpuBackend)) {
+pub(crate) fn everywhere(test: impl Fn(Route, &mut WgpuBackend)) {
     for route in ROUTES {
         if let Some(mut backend) = open(route) {
             println!("{route:?}: {}", backend.info());
@@ -80,7 +78,7 @@ pub fn everywhere(test: impl Fn(Route, &mut WgpuBackend)) {
 }
 
 /// A strict plan of everything the graph asks for.
-pub fn plan(
+pub(crate) fn plan(
     backend: &WgpuBackend,
     graph: &Graph,
     library: &KernelLibrary,
@@ -96,7 +94,7 @@ pub fn plan(
 }
 
 /// Plans and runs once, capturing outputs.
-pub fn run(
+pub(crate) fn run(
     backend: &mut WgpuBackend,
     graph: &Graph,
     library: &KernelLibrary,
@@ -109,14 +107,14 @@ pub fn run(
 }
 
 /// A library with one added kernel.
-pub fn library(path: &str, source: &str) -> KernelLibrary {
+pub(crate) fn library(path: &str, source: &str) -> KernelLibrary {
     let mut library = KernelLibrary::new();
     library.add_source(path, source);
     library
 }
 
 /// A kernel that copies one texel per invocation into a storage texture.
-pub fn copy_kernel(format: Format) -> String {
+pub(crate) fn copy_kernel(format: Format) -> String {
     let ty = match format.sample_kind() {
         SampleKind::Float | SampleKind::Depth => "f32",
         SampleKind::Sint => "i32",
@@ -124,18 +122,18 @@ pub fn copy_kernel(format: Format) -> String {
     };
     format!(
         "@group(0) @binding(0) var source: texture_2d<{ty}>;
-         @group(0) @binding(1) var target: texture_storage_2d<{format}, write>;
+         @group(0) @binding(1) var result: texture_storage_2d<{format}, write>;
          @compute @workgroup_size(8, 8)
          fn main(@builtin(global_invocation_id) id: vec3u) {{
-             let size = textureDimensions(target);
+             let size = textureDimensions(result);
              if id.x >= size.x || id.y >= size.y {{ return; }}
-             textureStore(target, id.xy, textureLoad(source, id.xy, 0));
+             textureStore(result, id.xy, textureLoad(source, id.xy, 0));
          }}"
     )
 }
 
 /// Bytes that say where they are and look like nothing else.
-pub fn noise(length: usize, seed: u32) -> Vec<u8> {
+pub(crate) fn noise(length: usize, seed: u32) -> Vec<u8> {
     let mut state = seed.wrapping_mul(0x9e37_79b9) | 1;
     (0..length)
         .map(|_| {
@@ -150,7 +148,7 @@ pub fn noise(length: usize, seed: u32) -> Vec<u8> {
 
 /// An image whose every texel differs from its neighbours and which loads and
 /// stores without change: floats are finite and normal, in the format's range.
-pub fn image(desc: TextureDesc) -> ImageData {
+pub(crate) fn image(desc: TextureDesc) -> ImageData {
     let length = desc.bytes().expect("a small image") as usize;
     let mut bytes = noise(length, length as u32);
     match desc.format {
@@ -180,4 +178,39 @@ pub fn image(desc: TextureDesc) -> ImageData {
         _ => {}
     }
     ImageData::from_bytes(desc, bytes).expect("the length is the description's")
+}
+
+/// The 32-bit words of a buffer captured as an output.
+pub(crate) fn words(execution: &Execution, output: &str) -> Vec<u32> {
+    let bytes = execution
+        .captures
+        .iter()
+        .find_map(|captured| match &captured.data {
+            CapturedData::Buffer(bytes)
+                if captured.pass == "output" && captured.binding == output =>
+            {
+                Some(bytes)
+            }
+            _ => None,
+        })
+        .expect("the buffer was captured");
+    bytes
+        .chunks_exact(4)
+        .map(|bytes| u32::from_le_bytes(bytes.try_into().expect("four bytes")))
+        .collect()
+}
+
+/// The texels of an image of one 32-bit channel.
+pub(crate) fn uints(image: &ImageData) -> Vec<u32> {
+    assert_eq!(image.desc.format.texel_bytes(), 4);
+    image
+        .bytes
+        .chunks_exact(4)
+        .map(|bytes| u32::from_le_bytes(bytes.try_into().expect("four bytes")))
+        .collect()
+}
+
+/// The texels of an image of one 32-bit float channel.
+pub(crate) fn floats(image: &ImageData) -> Vec<f32> {
+    uints(image).into_iter().map(f32::from_bits).collect()
 }

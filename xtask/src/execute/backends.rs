@@ -1,6 +1,6 @@
 //! Opens the backend a job asks for.
 
-use etalon::ash::{AshBackend, AshOptions};
+use etalon::ash::{AshBackend, AshOptions, Validation};
 use etalon::cpu::{CpuBackend, CpuOptions};
 use etalon::wgpu::{WgpuBackend, WgpuOptions, wgpu::Backends};
 use etalon_core::backend::{Backend, BackendError};
@@ -27,6 +27,16 @@ pub fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
                 ..WgpuOptions::default()
             })?)
         }
-        BackendKind::Ash => Box::new(AshBackend::new(&AshOptions::default())?),
+        BackendKind::Ash => {
+            let validation = if job.validate {
+                Validation::Synchronization
+            } else {
+                Validation::Off
+            };
+            Box::new(AshBackend::new(AshOptions {
+                validation,
+                ..AshOptions::default()
+            })?)
+        }
     })
 }

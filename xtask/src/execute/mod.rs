@@ -92,6 +92,9 @@ pub struct Job {
     /// Threads of the interpreter; 0 for as many as there are processors.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
+    /// Whether ash runs under the validation layer, whose messages are errors.
+    #[arg(long)]
+    pub validate: bool,
     /// A fault to plant.
     #[arg(long)]
     pub plant: Option<Fault>,
@@ -140,6 +143,9 @@ impl Job {
             add("--plant", fault.to_string().into());
         }
         add("--out", (&self.out).into());
+        if self.validate {
+            arguments.push("--validate".into());
+        }
         arguments
     }
 }

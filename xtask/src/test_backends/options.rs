@@ -83,6 +83,9 @@ pub struct Options {
     /// Write everything measured to this file
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
+    /// Run ash under the Khronos validation layer, its messages being failures
+    #[arg(long)]
+    pub validate: bool,
     /// First install Vulkan drivers and tools (Debian and its kin)
     #[arg(long)]
     pub setup: bool,
@@ -126,6 +129,7 @@ impl Options {
             arithmetic,
             frames: self.frames,
             threads: self.threads,
+            validate: self.validate,
             plant: planted.map(|(_, fault)| fault.clone()),
             out,
         }

@@ -149,6 +149,7 @@ mod tests {
             arithmetic: ArithmeticName::Strict,
             frames: 1,
             threads: 0,
+            validate: true,
             plant: None,
             out,
         };
@@ -195,7 +196,7 @@ mod tests {
 
     #[test]
     fn the_driver_and_the_job_reach_the_process() {
-        let script = r#"while [ "$1" != --out ]; do all="$all $1"; shift; done
+        let script = r#"while [ "$1" != --out ]; do all="$all $1"; shift; done; all="$all $3"
             printf '{"status": "no-device", "reason": "%s|%s|%s"}' "$all" "$VK_DRIVER_FILES" "$VK_ICD_FILENAMES" > "$2/outcome.json""#;
         let (status, run) = run_script(script, LONG);
         assert!(run.is_none());
@@ -205,7 +206,7 @@ mod tests {
         assert_eq!(
             reason,
             " execute --backend ash --api vulkan --scene wet-floor --size 4x2 --effect chain --arithmetic strict \
-             --frames 1 --threads 0|/icd/test.json|/icd/test.json"
+             --frames 1 --threads 0 --validate|/icd/test.json|/icd/test.json"
         );
     }
 }

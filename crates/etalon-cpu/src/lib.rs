@@ -1,1 +1,33 @@
-//! .
+//! CPU backend of Etalon: kernels as bytecode over wide lanes.
+//!
+//! A kernel's naga module is [translated](Program::from_module) into a tree of
+//! scalar instructions, lowered to blocks of bytecode, and run by an
+//! [`Executor`]: all invocations of a workgroup together, one instruction at a
+//! time, each over 64 lanes with vector instructions. What is the same in all
+//! invocations is computed once. Where invocations part ways, both ways are run
+//! under a mask.
+//!
+//! Arithmetic is IEEE 754 binary32 without fused operations and with
+//! subnormals, so results of `+ - * / sqrt` and of what is made from them are
+//! exactly those of strict devices. They do not depend on the instruction set
+//! or the number of threads, save for the payload of NaNs.
+
+#![deny(unsafe_code)]
+
+mod binding;
+mod code;
+mod error;
+mod exec;
+mod ir;
+mod lower;
+mod memory;
+mod num;
+mod program;
+mod registers;
+mod translate;
+
+pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
+pub use error::{Location, RunError, TranslateError};
+pub use exec::{DispatchCounters, Executor, Tier};
+pub use memory::{Buffer, Texture};
+pub use program::{BoundResource, Program};

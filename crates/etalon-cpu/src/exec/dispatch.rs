@@ -1,0 +1,212 @@
+//! Dispatching: workgroups over workers.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use rayon::prelude::*;
+
+use super::link::Linked;
+use super::state::{Failure, LocalIds, Resource, State};
+use super::tier::Tier;
+use crate::code::Code;
+use crate::error::RunError;
+use crate::num::Number;
+use crate::registers::{LANES, Lanes, Registers};
+
+/// Workers and what they run with.
+#[derive(Debug)]
+pub struct Executor {
+    pool: rayon::ThreadPool,
+    tier: Tier,
+    batch: u32,
+    max_trips: u32,
+}
+
+/// What a dispatch did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DispatchCounters {
+    /// Workgroups run.
+    pub workgroups: u64,
+    /// Invocations run.
+    pub invocations: u64,
+}
+
+impl Executor {
+    /// Default for [`Executor::with_max_trips`]: more than any loop over the
+    /// texels of a 4096² image, and minutes rather than hours of work.
+    pub const DEFAULT_MAX_TRIPS: u32 = 1 << 24;
+
+    /// An executor with a number of threads; 0 for one per processor.
+    ///
+    /// # Errors
+    /// [`RunError::Threads`] if the system does not give them.
+    pub fn new(threads: usize) -> Result<Self, RunError> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|index| format!("etalon-cpu-{index}"))
+            .build()
+            .map_err(|error| RunError::Threads { reason: error.to_string() })?;
+        Ok(Self { pool, tier: Tier::best(), batch: LANES as u32, max_trips: Self::DEFAULT_MAX_TRIPS })
+    }
+
+    /// Runs on the given instruction set, or the baseline if the processor has it not.
+    #[must_use]
+    pub fn with_tier(mut self, tier: Tier) -> Self {
+        self.tier = tier.or_baseline();
+        self
+    }
+
+    /// The most lanes of a workgroup that run together, rounded up to a multiple
+    /// of 64. Workgroups that share memory or have barriers always run whole.
+    #[must_use]
+    pub fn with_lanes(mut self, lanes: u32) -> Self {
+        self.batch = lanes.clamp(1, 1 << 16).next_multiple_of(LANES as u32);
+        self
+    }
+
+    /// How often a loop may repeat before the dispatch fails with
+    /// [`RunError::EndlessLoop`].
+    #[must_use]
+    pub fn with_max_trips(mut self, max_trips: u32) -> Self {
+        self.max_trips = max_trips.max(1);
+        self
+    }
+
+    /// The instruction set in use.
+    #[must_use]
+    pub fn tier(&self) -> Tier {
+        self.tier
+    }
+
+    /// Number of threads.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+}
+
+/// What a failed dispatch says; [`crate::Program`] adds the names.
+#[derive(Debug)]
+pub(crate) enum DispatchFailure {
+    Failed(Failure, u32),
+    TooManyWorkgroups,
+    OutOfMemory(u64),
+}
+
+/// A kernel ready to be dispatched.
+pub(crate) struct Job<'a, N: Number> {
+    pub(crate) code: &'a Code,
+    pub(crate) linked: &'a Linked<N>,
+    pub(crate) resources: &'a [Resource<'a>],
+    pub(crate) local_ids: &'a LocalIds,
+    pub(crate) invocations: u32,
+}
+
+impl<N: Number> Job<'_, N> {
+    pub(crate) fn run(&self, executor: &Executor, workgroups: [u32; 3]) -> Result<DispatchCounters, DispatchFailure> {
+        let total = workgroups.iter().try_fold(1_u64, |total, &count| total.checked_mul(count.into())).ok_or(DispatchFailure::TooManyWorkgroups)?;
+        if total == 0 {
+            return Ok(DispatchCounters::default());
+        }
+        let next = AtomicU64::new(0);
+        let stop = AtomicBool::new(false);
+        let failure = Mutex::new(None::<DispatchFailure>);
+        // Small enough shares that no worker is left alone with the rest, large
+        // enough that neighbours share cache lines of what they read.
+        let threads = if self.code.depends_on_order() { 1 } else { executor.threads() };
+        let share = (total / (threads as u64 * 16)).clamp(1, 64);
+        let work = || {
+            let result = self.work(executor, workgroups, total, share, &next, &stop);
+            if let Err(found) = result {
+                stop.store(true, Ordering::Relaxed);
+                let mut failure = match failure.lock() {
+                    Ok(guard) => guard,
+                    Err(poisoned) => poisoned.into_inner(),
+                };
+                failure.get_or_insert(found);
+            }
+        };
+        if threads == 1 {
+            executor.pool.install(work);
+        } else {
+            executor.pool.install(|| (0..threads).into_par_iter().with_max_len(1).for_each(|_| work()));
+        }
+        let failure = match failure.into_inner() {
+            Ok(failure) => failure,
+            Err(poisoned) => poisoned.into_inner(),
+        };
+        match failure {
+            Some(failure) => Err(failure),
+            None => Ok(DispatchCounters { workgroups: total, invocations: total.saturating_mul(self.invocations.into()) }),
+        }
+    }
+
+    /// What one worker does: takes shares of the workgroups until none is left.
+    fn work(&self, executor: &Executor, workgroups: [u32; 3], total: u64, share: u64, next: &AtomicU64, stop: &AtomicBool) -> Result<(), DispatchFailure> {
+        let all_chunks = self.local_ids.active.len();
+        let most = if self.code.needs_whole_workgroup() { all_chunks } else { all_chunks.min(executor.batch as usize / LANES) };
+        let mut state: Option<State<'_, N>> = None;
+        let [x, y, _] = workgroups.map(u64::from);
+        loop {
+            let first = next.fetch_add(share, Ordering::Relaxed);
+            if first >= total || stop.load(Ordering::Relaxed) {
+                return Ok(());
+            }
+            let state = match &mut state {
+                Some(state) => state,
+                empty => empty.insert(self.state(most, workgroups)?),
+            };
+            for index in first..(first + share).min(total) {
+                // Each is below its count, which is 32 bits.
+                state.workgroup = [(index % x) as u32, (index / x % y) as u32, (index / (x * y)) as u32];
+                state.workgroup_floats.fill(N::default());
+                state.workgroup_ints.fill(0);
+                let mut chunk = 0;
+                while chunk < all_chunks {
+                    state.first_chunk = chunk;
+                    state.chunks = most.min(all_chunks - chunk);
+                    chunk += state.chunks;
+                    self.linked.run(state, executor.max_trips).map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
+                }
+            }
+        }
+    }
+
+    fn state(&self, chunks: usize, workgroups: [u32; 3]) -> Result<State<'_, N>, DispatchFailure> {
+        let [vf, vi, uf, ui] = self.code.files.map(|size| size as usize);
+        let resources = &self.code.resources;
+        let mut state = State {
+            registers: Registers {
+                floats: allocate(vf.saturating_mul(chunks))?,
+                ints: allocate(vi.saturating_mul(chunks))?,
+                uniform_floats: allocate(uf)?,
+                uniform_ints: allocate(ui)?,
+            },
+            chunks,
+            private_floats: allocate::<Lanes<N>>((resources.private.float as usize).saturating_mul(chunks))?,
+            private_ints: allocate::<Lanes<u32>>((resources.private.int as usize).saturating_mul(chunks))?,
+            workgroup_floats: allocate(resources.workgroup.float as usize)?,
+            workgroup_ints: allocate(resources.workgroup.int as usize)?,
+            code: self.code,
+            resources: self.resources,
+            local_ids: self.local_ids,
+            first_chunk: 0,
+            workgroup: [0; 3],
+            workgroups,
+            failure: None,
+            trips: vec![0; self.code.loops.len()],
+        };
+        for &(slot, bits) in &self.code.constants {
+            state.set_bits(slot, 0, &[bits]);
+        }
+        self.linked.run_prologue(&mut state);
+        Ok(state)
+    }
+}
+
+fn allocate<T: Clone + Default>(count: usize) -> Result<Vec<T>, DispatchFailure> {
+    let mut vec = Vec::new();
+    vec.try_reserve_exact(count).map_err(|_| DispatchFailure::OutOfMemory((count as u64).saturating_mul(size_of::<T>() as u64)))?;
+    vec.resize(count, T::default());
+    Ok(vec)
+}

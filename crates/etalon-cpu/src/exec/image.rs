@@ -1,0 +1,248 @@
+//! Handlers of texel loads and stores, and of texture queries.
+
+use std::sync::atomic::Ordering;
+
+use super::link::Instr;
+use super::memory::rounds;
+use super::state::{Resource, State};
+use super::tier::{Handler, Step, Tier};
+use crate::code::{CodeInst, Slot};
+use crate::ir::{ImageAccess, ImageQuery, Op};
+use crate::memory::{Level, Texels, Texture, decode, encode};
+use crate::num::{Number, mask};
+use crate::registers::LANES;
+
+pub(super) fn load<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
+    if varying { Handler::new::<Load<LANES>>(tier) } else { Handler::plain::<Load<1>>() }
+}
+
+pub(super) fn query<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
+    if varying { Handler::new::<Query<LANES>>(tier) } else { Handler::plain::<Query<1>>() }
+}
+
+pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a Texture> {
+    match state.resources.get(usize::from(image)) {
+        Some(&Resource::Texture(texture)) => Some(texture),
+        _ => None,
+    }
+}
+
+/// Stands for a texel outside: no texture has so many.
+pub(super) const OUTSIDE: u32 = u32::MAX;
+
+/// The indices of texels; coordinates are unsigned, so that negative ones are outside.
+#[inline(always)]
+fn locate<const K: usize>(level: Level, x: &[u32; K], y: &[u32; K], z: Option<&[u32; K]>, out: &mut [u32; K]) {
+    let Level { width, height, depth, start } = level;
+    match z {
+        Some(z) => {
+            for k in 0..K {
+                let inside = mask((x[k] < width) & (y[k] < height) & (z[k] < depth));
+                let index = z[k].wrapping_mul(height).wrapping_add(y[k]).wrapping_mul(width).wrapping_add(x[k]).wrapping_add(start);
+                out[k] = index | !inside;
+            }
+        }
+        None => {
+            for k in 0..K {
+                let inside = mask((x[k] < width) & (y[k] < height));
+                let index = y[k].wrapping_mul(width).wrapping_add(x[k]).wrapping_add(start);
+                out[k] = index | !inside;
+            }
+        }
+    }
+}
+
+/// The indices of the texels that an instruction's operands name.
+#[inline(always)]
+fn addresses<N: Number, const K: usize>(state: &State<'_, N>, texture: &Texture, access: ImageAccess, operands: &[Slot], level: Option<Slot>, chunk: usize) -> [u32; K] {
+    let (x, y) = (state.ints(operands[0], chunk), state.ints(operands[1], chunk));
+    let z: Option<[u32; K]> = (access.coordinates == 3 || access.layered).then(|| state.ints(operands[2], chunk));
+    let mut out = [OUTSIDE; K];
+    match level {
+        Some(level) if level.varying => {
+            let levels: [u32; K] = state.ints(level, chunk);
+            for k in 0..K {
+                if let Some(&level) = texture.levels.get(levels[k] as usize) {
+                    let mut one = [OUTSIDE; 1];
+                    locate(level, &[x[k]], &[y[k]], z.map(|z| [z[k]]).as_ref(), &mut one);
+                    out[k] = one[0];
+                }
+            }
+        }
+        level => {
+            let level: [u32; 1] = level.map_or([0], |level| state.ints(level, chunk));
+            if let Some(&level) = texture.levels.get(level[0] as usize) {
+                locate(level, &x, &y, z.as_ref(), &mut out);
+            }
+        }
+    }
+    out
+}
+
+/// The words of texels; zero outside.
+#[inline(always)]
+pub(super) fn gather<const K: usize>(texels: &Texels, index: &[u32; K], words: &mut [[u64; K]; 2]) {
+    let low = &mut words[0];
+    match texels {
+        Texels::B1(texels) => {
+            for k in 0..K {
+                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+            }
+        }
+        Texels::B2(texels) => {
+            for k in 0..K {
+                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+            }
+        }
+        Texels::B4(texels) => {
+            for k in 0..K {
+                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+            }
+        }
+        Texels::B8(texels) => {
+            for k in 0..K {
+                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed));
+            }
+        }
+        Texels::B16(texels) => {
+            let [low, high] = words;
+            for k in 0..K {
+                let at = index[k] as usize * 2;
+                (low[k], high[k]) = match texels.get(at..at + 2) {
+                    Some([l, h]) => (l.load(Ordering::Relaxed), h.load(Ordering::Relaxed)),
+                    _ => (0, 0),
+                };
+            }
+        }
+    }
+}
+
+#[inline(always)]
+pub(super) fn wanted(inst: &CodeInst) -> [bool; 4] {
+    std::array::from_fn(|channel| inst.results.get(channel).is_some_and(Option::is_some))
+}
+
+struct Load<const K: usize>;
+
+impl<N: Number, const K: usize> Step<N> for Load<K> {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: Instr) {
+        let inst = state.inst(instr.index);
+        let Op::ImageLoad { access, level, .. } = inst.op else { return };
+        let Some(texture) = texture(state, access.image) else { return };
+        let level = if level { inst.operands.last().copied() } else { None };
+        let format = texture.desc().format;
+        let wanted = wanted(inst);
+        for chunk in 0..rounds::<N, K>(state) {
+            let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
+            let mut words = [[0; K]; 2];
+            gather(&texture.texels, &index, &mut words);
+            let mut channels = [[0; K]; 4];
+            decode(format, &words, wanted, &mut channels);
+            // Channels that the format has not are 0, 0, 1 inside only.
+            for channel in format.channels() as usize..4 {
+                for k in 0..K {
+                    channels[channel][k] &= mask(index[k] != OUTSIDE);
+                }
+            }
+            for (result, channel) in inst.results.iter().zip(&channels) {
+                if let Some(to) = *result {
+                    state.set_bits(to, chunk, channel);
+                }
+            }
+        }
+    }
+}
+
+pub(super) struct Store;
+
+impl<N: Number> Step<N> for Store {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: Instr) {
+        let inst = state.inst(instr.index);
+        let Op::ImageStore { access, .. } = inst.op else { return };
+        let Some(texture) = texture(state, access.image) else { return };
+        let (coordinates, value) = inst.operands.split_at(inst.operands.len() - 4);
+        for chunk in 0..state.chunks {
+            let mut index = addresses::<N, LANES>(state, texture, access, coordinates, None, chunk);
+            if inst.mask.is_some() {
+                let active = state.mask(inst, chunk);
+                for k in 0..LANES {
+                    index[k] |= !active[k];
+                }
+            }
+            let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
+            let mut words = [[0; LANES]; 2];
+            encode(texture.desc().format, &channels, &mut words);
+            scatter(&texture.texels, &index, &words);
+        }
+    }
+}
+
+/// Writes words where the index is inside.
+#[inline(always)]
+fn scatter(texels: &Texels, index: &[u32; LANES], words: &[[u64; LANES]; 2]) {
+    let [low, high] = words;
+    match texels {
+        Texels::B1(texels) => {
+            for k in 0..LANES {
+                if let Some(texel) = texels.get(index[k] as usize) {
+                    texel.store(low[k] as u8, Ordering::Relaxed);
+                }
+            }
+        }
+        Texels::B2(texels) => {
+            for k in 0..LANES {
+                if let Some(texel) = texels.get(index[k] as usize) {
+                    texel.store(low[k] as u16, Ordering::Relaxed);
+                }
+            }
+        }
+        Texels::B4(texels) => {
+            for k in 0..LANES {
+                if let Some(texel) = texels.get(index[k] as usize) {
+                    texel.store(low[k] as u32, Ordering::Relaxed);
+                }
+            }
+        }
+        Texels::B8(texels) => {
+            for k in 0..LANES {
+                if let Some(texel) = texels.get(index[k] as usize) {
+                    texel.store(low[k], Ordering::Relaxed);
+                }
+            }
+        }
+        Texels::B16(texels) => {
+            for k in 0..LANES {
+                let at = index[k] as usize * 2;
+                if let Some([l, h]) = texels.get(at..at + 2) {
+                    l.store(low[k], Ordering::Relaxed);
+                    h.store(high[k], Ordering::Relaxed);
+                }
+            }
+        }
+    }
+}
+
+struct Query<const K: usize>;
+
+impl<N: Number, const K: usize> Step<N> for Query<K> {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: Instr) {
+        let inst = state.inst(instr.index);
+        let (Op::ImageQuery { image, query }, Some(Some(to))) = (inst.op, inst.results.first().copied()) else { return };
+        let Some(texture) = texture(state, image) else { return };
+        for chunk in 0..rounds::<N, K>(state) {
+            let level: [u32; K] = inst.operands.first().map_or([0; K], |&slot| state.ints(slot, chunk));
+            let answer = level.map(|level| match query {
+                ImageQuery::Size(axis) => texture.levels.get(level as usize).map_or(0, |level| [level.width, level.height, level.depth][usize::from(axis.min(2))]),
+                ImageQuery::Levels => texture.desc().mips,
+                ImageQuery::Layers => match texture.desc().dimension {
+                    etalon_core::resource::Dimension::Cube => texture.desc().layers() / 6,
+                    _ => texture.desc().layers(),
+                },
+            });
+            state.set_ints(to, chunk, &answer);
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! A program's instructions as calls.
+
+use super::arith::{self, Select};
+use super::state::{Failure, State};
+use super::tier::{Handler, Step, Tier};
+use super::{image, memory, sample};
+use crate::code::{Code, CodeInst, End};
+use crate::ir::Op;
+use crate::num::Number;
+
+/// The registers of a simple instruction, and where the whole one is found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Instr {
+    pub(super) d: u16,
+    pub(super) a: u16,
+    pub(super) b: u16,
+    /// Third operand, or the mask of a copy.
+    pub(super) c: u16,
+    /// Index in [`Code::insts`].
+    pub(super) index: u32,
+}
+
+/// A program linked to the handlers of an instruction set.
+#[derive(Debug)]
+pub(crate) struct Linked<N: Number> {
+    calls: Vec<(Handler<N>, Instr)>,
+}
+
+impl<N: Number> Linked<N> {
+    pub(crate) fn new(code: &Code, tier: Tier) -> Self {
+        let calls = code
+            .insts
+            .iter()
+            .enumerate()
+            .map(|(index, inst)| {
+                let operand = |i: usize| inst.operands.get(i).map_or(0, |slot| slot.number);
+                let instr = Instr {
+                    d: inst.results.first().copied().flatten().map_or(0, |slot| slot.number),
+                    a: operand(0),
+                    b: operand(1),
+                    c: inst.mask.map_or_else(|| operand(2), |mask| mask.number),
+                    index: index as u32,
+                };
+                (handler(inst, tier), instr)
+            })
+            .collect();
+        Self { calls }
+    }
+
+    /// Runs the instructions that fill the uniform registers once per worker.
+    pub(super) fn run_prologue(&self, state: &mut State<'_, N>) {
+        for &(handler, instr) in &self.calls[..state.code.prologue as usize] {
+            handler.call(state, instr);
+        }
+    }
+
+    /// Runs one batch.
+    pub(super) fn run(&self, state: &mut State<'_, N>, max_trips: u32) -> Result<(), Failure> {
+        let code = state.code;
+        let mut next = 0_u32;
+        loop {
+            let block = code.blocks[next as usize];
+            for &(handler, instr) in &self.calls[block.start as usize..block.stop as usize] {
+                handler.call(state, instr);
+            }
+            next = match block.end {
+                End::Jump(next) => next,
+                End::Branch { condition, yes, no } => {
+                    if state.registers.uniform_ints[usize::from(condition.number)] != 0 { yes } else { no }
+                }
+                End::Any { mask, yes, no } => {
+                    if state.any(mask) { yes } else { no }
+                }
+                End::Enter { counter, head } => {
+                    state.trips[counter as usize] = 0;
+                    head
+                }
+                End::Again { counter, head } => {
+                    let trips = &mut state.trips[counter as usize];
+                    *trips += 1;
+                    if *trips >= max_trips {
+                        return Err(Failure::EndlessLoop(counter));
+                    }
+                    head
+                }
+                End::Stop => break,
+            };
+        }
+        match state.failure.take() {
+            Some(failure) => Err(failure),
+            None => Ok(()),
+        }
+    }
+}
+
+fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
+    let varying_result = inst.results.iter().flatten().any(|slot| slot.varying);
+    match inst.op {
+        Op::Arith(op) => {
+            let varying: Vec<bool> = inst.operands.iter().map(|slot| slot.varying).collect();
+            op.visit(Select { tier, varying: &varying })
+        }
+        Op::Move(class) => arith::copy(tier, class, inst.operands[0].varying, varying_result, inst.mask.is_some()),
+        Op::Input(_) => Handler::plain::<memory::InputStep>(),
+        Op::Table { .. } => memory::table(tier, varying_result),
+        Op::BufferLoad { .. } => memory::buffer_load(tier, varying_result),
+        Op::BufferStore { .. } => Handler::plain::<memory::BufferStore>(),
+        Op::BufferLength { .. } => Handler::plain::<memory::BufferLength>(),
+        Op::BufferAtomic { .. } => Handler::plain::<memory::BufferAtomic>(),
+        Op::MemoryLoad { .. } => memory::memory_load(tier, varying_result),
+        Op::MemoryStore { .. } => Handler::plain::<memory::MemoryStore>(),
+        Op::WorkgroupAtomic { .. } => Handler::plain::<memory::WorkgroupAtomic>(),
+        Op::ImageLoad { .. } => image::load(tier, varying_result),
+        Op::ImageStore { .. } => Handler::new::<image::Store>(tier),
+        Op::ImageSample { .. } => sample::sample(tier, varying_result),
+        Op::ImageQuery { .. } => image::query(tier, varying_result),
+        Op::Barrier => Handler::plain::<Barrier>(),
+    }
+}
+
+/// Notes a failure unless every invocation of the workgroup is active.
+struct Barrier;
+
+impl<N: Number> Step<N> for Barrier {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: Instr) {
+        let inst = state.inst(instr.index);
+        for chunk in 0..state.chunks {
+            let active = state.local_ids.active[state.first_chunk + chunk].0;
+            let mask = state.mask(inst, chunk);
+            if active.iter().zip(&mask).any(|(active, mask)| active & !mask != 0) {
+                state.failure.get_or_insert(Failure::DivergentBarrier(instr.index));
+            }
+        }
+    }
+}

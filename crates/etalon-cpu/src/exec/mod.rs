@@ -1,0 +1,23 @@
+//! Running bytecode.
+//!
+//! A worker holds a [`State`]: register files of lanes, and where in the
+//! dispatch it is. Each instruction has a handler, a function that is generic
+//! over the number type and compiled once per instruction set; a program is
+//! linked to the handlers of one set and then is a list of calls.
+
+mod arith;
+mod dispatch;
+mod image;
+mod link;
+mod memory;
+mod sample;
+mod state;
+#[allow(unsafe_code)]
+mod tier;
+
+pub use dispatch::{DispatchCounters, Executor};
+pub use tier::Tier;
+
+pub(crate) use dispatch::{DispatchFailure, Job};
+pub(crate) use link::Linked;
+pub(crate) use state::{Failure, LocalIds, Resource};

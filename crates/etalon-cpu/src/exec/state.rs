@@ -1,0 +1,174 @@
+//! What a worker knows.
+
+use std::sync::atomic::AtomicU32;
+
+use etalon_core::resource::SamplerDesc;
+
+use crate::code::{Code, CodeInst, Slot};
+use crate::memory::Texture;
+use crate::num::Number;
+use crate::registers::{Class, LANES, Lanes, Registers};
+
+/// Something bound.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Resource<'a> {
+    /// A buffer: its words, and its size in bytes.
+    Buffer(&'a [AtomicU32], u64),
+    Texture(&'a Texture),
+    Sampler(SamplerDesc),
+}
+
+/// Identifiers of the invocations of a workgroup, a chunk of lanes at a time.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalIds {
+    /// By axis, then the index.
+    pub(crate) ids: [Vec<Lanes<u32>>; 4],
+    /// All ones where there is an invocation.
+    pub(crate) active: Vec<Lanes<u32>>,
+}
+
+impl LocalIds {
+    pub(crate) fn new(size: [u32; 3]) -> Self {
+        let count = size[0] * size[1] * size[2];
+        let chunks = (count as usize).div_ceil(LANES);
+        let lanes = |value: &dyn Fn(u32) -> u32| -> Vec<Lanes<u32>> {
+            (0..chunks).map(|chunk| Lanes(std::array::from_fn(|lane| value((chunk * LANES + lane) as u32)))).collect()
+        };
+        // Lanes past the end repeat the last invocation: whatever they compute,
+        // they compute on sensible values.
+        let at = |index: u32| index.min(count - 1);
+        Self {
+            ids: [
+                lanes(&|i| at(i) % size[0]),
+                lanes(&|i| at(i) / size[0] % size[1]),
+                lanes(&|i| at(i) / (size[0] * size[1])),
+                lanes(&at),
+            ],
+            active: lanes(&|i| crate::num::mask(i < count)),
+        }
+    }
+}
+
+/// Why a worker stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Failure {
+    /// By the loop's number.
+    EndlessLoop(u32),
+    /// By the instruction's index.
+    DivergentBarrier(u32),
+}
+
+/// A worker's state.
+pub(crate) struct State<'a, N> {
+    pub(crate) registers: Registers<N>,
+    /// Chunks of lanes in a register.
+    pub(crate) chunks: usize,
+    pub(crate) private_floats: Vec<Lanes<N>>,
+    pub(crate) private_ints: Vec<Lanes<u32>>,
+    pub(crate) workgroup_floats: Vec<N>,
+    pub(crate) workgroup_ints: Vec<u32>,
+    pub(crate) code: &'a Code,
+    pub(crate) resources: &'a [Resource<'a>],
+    pub(crate) local_ids: &'a LocalIds,
+    /// First chunk of the workgroup that the batch has.
+    pub(crate) first_chunk: usize,
+    pub(crate) workgroup: [u32; 3],
+    pub(crate) workgroups: [u32; 3],
+    pub(crate) failure: Option<Failure>,
+    /// Trips of each loop since it was entered.
+    pub(crate) trips: Vec<u32>,
+}
+
+impl<'a, N: Number> State<'a, N> {
+    #[inline(always)]
+    pub(crate) fn inst(&self, index: u32) -> &'a CodeInst {
+        let code = self.code;
+        &code.insts[index as usize]
+    }
+
+    /// Where a chunk of a register of lanes is.
+    #[inline(always)]
+    pub(crate) fn at(&self, number: u16, chunk: usize) -> usize {
+        usize::from(number) * self.chunks + chunk
+    }
+
+    /// The integers of `K` lanes, or `K` times a uniform one.
+    #[inline(always)]
+    pub(crate) fn ints<const K: usize>(&self, slot: Slot, chunk: usize) -> [u32; K] {
+        if slot.varying {
+            first(&self.registers.ints[self.at(slot.number, chunk)].0)
+        } else {
+            [self.registers.uniform_ints[usize::from(slot.number)]; K]
+        }
+    }
+
+    /// The numbers of `K` lanes, or `K` times a uniform one.
+    #[inline(always)]
+    pub(crate) fn floats<const K: usize>(&self, slot: Slot, chunk: usize) -> [N; K] {
+        if slot.varying {
+            first(&self.registers.floats[self.at(slot.number, chunk)].0)
+        } else {
+            [self.registers.uniform_floats[usize::from(slot.number)]; K]
+        }
+    }
+
+    /// Either class as bits.
+    #[inline(always)]
+    pub(crate) fn bits<const K: usize>(&self, slot: Slot, chunk: usize) -> [u32; K] {
+        match slot.class {
+            Class::Int => self.ints(slot, chunk),
+            Class::Float => self.floats::<K>(slot, chunk).map(|lane| lane.to_f32().to_bits()),
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_ints<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[u32; K]) {
+        if slot.varying {
+            let at = self.at(slot.number, chunk);
+            self.registers.ints[at].0[..K].copy_from_slice(lanes);
+        } else {
+            self.registers.uniform_ints[usize::from(slot.number)] = lanes[0];
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_floats<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[N; K]) {
+        if slot.varying {
+            let at = self.at(slot.number, chunk);
+            self.registers.floats[at].0[..K].copy_from_slice(lanes);
+        } else {
+            self.registers.uniform_floats[usize::from(slot.number)] = lanes[0];
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn set_bits<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[u32; K]) {
+        match slot.class {
+            Class::Int => self.set_ints(slot, chunk, lanes),
+            Class::Float => self.set_floats(slot, chunk, &lanes.map(|bits| N::from_f32(f32::from_bits(bits)))),
+        }
+    }
+
+    /// The lanes that take part in an instruction.
+    #[inline(always)]
+    pub(crate) fn mask(&self, inst: &CodeInst, chunk: usize) -> [u32; LANES] {
+        match inst.mask {
+            Some(mask) => self.ints(mask, chunk),
+            None => [u32::MAX; LANES],
+        }
+    }
+
+    /// Whether any lane of a mask is set.
+    pub(crate) fn any(&self, mask: Slot) -> bool {
+        if !mask.varying {
+            return self.registers.uniform_ints[usize::from(mask.number)] != 0;
+        }
+        let first = self.at(mask.number, 0);
+        self.registers.ints[first..first + self.chunks].iter().any(|lanes| lanes.0.iter().fold(0, |all, lane| all | lane) != 0)
+    }
+}
+
+#[inline(always)]
+fn first<T: Copy, const K: usize>(lanes: &[T; LANES]) -> [T; K] {
+    std::array::from_fn(|k| lanes[k])
+}

@@ -1,0 +1,126 @@
+//! The same handlers, compiled for several instruction sets.
+//!
+//! The only unsafe code of the crate: functions that may use an instruction set
+//! are called where the processor was seen to have it.
+
+use std::fmt;
+
+use super::link::Instr;
+use super::state::State;
+use crate::num::Number;
+
+/// An instruction set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Tier {
+    /// What every processor of the architecture has: SSE2 on x86-64.
+    Baseline,
+    /// AVX2.
+    Avx2,
+    /// AVX-512 F, BW, DQ and VL.
+    Avx512,
+}
+
+impl Tier {
+    /// All, from the least on.
+    pub const ALL: [Self; 3] = [Self::Baseline, Self::Avx2, Self::Avx512];
+
+    /// Whether this processor has it.
+    #[must_use]
+    pub fn is_available(self) -> bool {
+        match self {
+            Self::Baseline => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                std::is_x86_feature_detected!("avx2")
+                    && std::is_x86_feature_detected!("avx512f")
+                    && std::is_x86_feature_detected!("avx512bw")
+                    && std::is_x86_feature_detected!("avx512dq")
+                    && std::is_x86_feature_detected!("avx512vl")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// The largest one this processor has.
+    #[must_use]
+    pub fn best() -> Self {
+        Self::ALL.into_iter().rev().find(|tier| tier.is_available()).unwrap_or(Self::Baseline)
+    }
+
+    /// This one if the processor has it, the baseline otherwise.
+    #[must_use]
+    pub fn or_baseline(self) -> Self {
+        if self.is_available() { self } else { Self::Baseline }
+    }
+}
+
+impl fmt::Display for Tier {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Baseline => "baseline",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        })
+    }
+}
+
+/// What an instruction does to a worker's state.
+pub(super) trait Step<N: Number> {
+    fn run(state: &mut State<'_, N>, instr: Instr);
+}
+
+type Function<N> = unsafe fn(&mut State<'_, N>, Instr);
+
+/// A [`Step`] compiled for an instruction set that this processor has.
+#[derive(Debug)]
+pub(super) struct Handler<N: Number>(Function<N>);
+
+impl<N: Number> Clone for Handler<N> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<N: Number> Copy for Handler<N> {}
+
+impl<N: Number> Handler<N> {
+    /// The step for an instruction set, or for the baseline where it is not available.
+    /// Steps that work on single numbers need only [`Handler::plain`].
+    pub(super) fn new<S: Step<N>>(tier: Tier) -> Self {
+        Self(match tier.or_baseline() {
+            #[cfg(target_arch = "x86_64")]
+            Tier::Avx512 => avx512::<N, S>,
+            #[cfg(target_arch = "x86_64")]
+            Tier::Avx2 => avx2::<N, S>,
+            _ => S::run,
+        })
+    }
+
+    /// The step for the baseline.
+    pub(super) fn plain<S: Step<N>>() -> Self {
+        Self(S::run)
+    }
+
+    #[inline(always)]
+    pub(super) fn call(self, state: &mut State<'_, N>, instr: Instr) {
+        // SAFETY: of the two constructors `plain` takes functions without target
+        // features, and `new` takes one with them only after the processor was
+        // seen to have them.
+        unsafe { (self.0)(state, instr) }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn avx2<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: Instr) {
+    S::run(state, instr);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+fn avx512<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: Instr) {
+    S::run(state, instr);
+}

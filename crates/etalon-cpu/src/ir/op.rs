@@ -1,0 +1,197 @@
+//! Instructions other than arithmetic.
+
+use std::fmt;
+
+use super::{Arith, Class};
+
+/// What a kernel is told about its place in the dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Input {
+    /// `local_invocation_id`, by axis.
+    LocalId(u8),
+    /// `local_invocation_index`.
+    LocalIndex,
+    /// `workgroup_id`, by axis.
+    WorkgroupId(u8),
+    /// `num_workgroups`, by axis.
+    NumWorkgroups(u8),
+    /// All ones in lanes that hold an invocation.
+    ActiveLanes,
+}
+
+/// Memory addressed by slots of one class, not by bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Memory {
+    /// One copy per invocation.
+    Private,
+    /// One copy per workgroup.
+    Workgroup,
+}
+
+/// A read-modify-write operation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum AtomicFunction {
+    Add,
+    Sub,
+    And,
+    Or,
+    Xor,
+    MinS,
+    MaxS,
+    MinU,
+    MaxU,
+    Exchange,
+    /// Operands are the expected and the new value.
+    CompareExchange,
+}
+
+/// How the texels of an image are addressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) struct ImageAccess {
+    /// Index into the program's bindings.
+    pub(crate) image: u16,
+    /// Number of coordinates: 2, or 3 for 3D and cube directions.
+    pub(crate) coordinates: u8,
+    /// Whether a layer (or cube) index follows the coordinates.
+    pub(crate) layered: bool,
+    /// Whether coordinates are a direction into a cube.
+    pub(crate) cube: bool,
+}
+
+/// Facts about an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum ImageQuery {
+    /// Texels along an axis, of the level given.
+    Size(u8),
+    Levels,
+    Layers,
+}
+
+/// What an instruction does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(crate) enum Op {
+    Arith(Arith),
+    Input(Input),
+    /// Copies the operand: what variables become.
+    Move(Class),
+    /// An element of a constant table.
+    Table { table: u32, class: Class },
+    /// A word of a uniform or storage buffer; the word's index is `offset` plus
+    /// the operand, if there is one. `constant` where nobody can write it.
+    BufferLoad { buffer: u16, offset: u32, class: Class, constant: bool },
+    /// Operands: the value, then the index if there is one.
+    BufferStore { buffer: u16, offset: u32, class: Class },
+    /// The number of elements of a runtime-sized array.
+    BufferLength { buffer: u16, offset: u32, stride: u32 },
+    /// Operands: value(s), then the index if there is one. Results: the old value.
+    BufferAtomic { buffer: u16, offset: u32, function: AtomicFunction },
+    /// A slot of memory; the slot is `slot` plus the operand, if there is one.
+    MemoryLoad { memory: Memory, slot: u32, class: Class },
+    /// Operands: the value, then the index if there is one.
+    MemoryStore { memory: Memory, slot: u32, class: Class },
+    /// Like [`Op::BufferAtomic`] on workgroup memory.
+    WorkgroupAtomic { slot: u32, function: AtomicFunction },
+    /// Operands: coordinates, layer, level (absent for storage images). Results: four channels.
+    ImageLoad { access: ImageAccess, class: Class, level: bool },
+    /// Operands: coordinates, layer, four channels.
+    ImageStore { access: ImageAccess, class: Class },
+    /// Operands: coordinates, layer, level. Results: four channels.
+    ImageSample { access: ImageAccess, sampler: u16 },
+    /// Operand: the level, for sizes of mipmapped images.
+    ImageQuery { image: u16, query: ImageQuery },
+    /// Fails unless every invocation is active.
+    Barrier,
+}
+
+impl Op {
+    /// Whether the instruction can be repeated, moved within its scope, and
+    /// dropped when its results are not wanted.
+    pub(crate) fn is_pure(self) -> bool {
+        match self {
+            Self::BufferLoad { constant, .. } => constant,
+            Self::ImageLoad { level, .. } => level,
+            Self::Arith(_) | Self::Input(_) | Self::Table { .. } | Self::BufferLength { .. } | Self::ImageSample { .. } | Self::ImageQuery { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// Whether the instruction can be dropped when its results are not wanted.
+    pub(crate) fn is_removable(self) -> bool {
+        self.is_pure() || matches!(self, Self::Move(_) | Self::BufferLoad { .. } | Self::MemoryLoad { .. } | Self::ImageLoad { .. })
+    }
+
+    /// Whether the same operands give the same result in the whole dispatch.
+    pub(crate) fn is_dispatch_constant(self) -> bool {
+        match self {
+            Self::Input(input) => matches!(input, Input::NumWorkgroups(_)),
+            _ => self.is_pure(),
+        }
+    }
+
+    /// Whether results differ between lanes even when the operands do not.
+    pub(crate) fn is_varying(self) -> bool {
+        match self {
+            Self::Input(input) => matches!(input, Input::LocalId(_) | Input::LocalIndex | Input::ActiveLanes),
+            Self::MemoryLoad { memory, .. } => memory == Memory::Private,
+            Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } => true,
+            _ => false,
+        }
+    }
+
+    /// Whether the instruction looks at which invocations are active.
+    pub(crate) fn is_masked(self) -> bool {
+        matches!(
+            self,
+            Self::BufferStore { .. } | Self::BufferAtomic { .. } | Self::MemoryStore { .. } | Self::WorkgroupAtomic { .. } | Self::ImageStore { .. } | Self::Barrier
+        )
+    }
+
+    /// What it costs to run it for nothing; `None` if that must not be done.
+    pub(crate) fn speculation_cost(self) -> Option<u32> {
+        match self {
+            Self::Arith(arith) => Some(arith.cost()),
+            Self::Input(_) | Self::Table { .. } | Self::BufferLength { .. } | Self::ImageQuery { .. } => Some(1),
+            Self::BufferLoad { .. } => Some(3),
+            Self::MemoryLoad { .. } => Some(3),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Op {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fn class(class: Class) -> &'static str {
+            match class {
+                Class::Float => "f",
+                Class::Int => "i",
+            }
+        }
+        fn axis(axis: u8) -> char {
+            char::from(b'x' + axis.min(2))
+        }
+        match *self {
+            Self::Arith(arith) => f.write_str(arith.mnemonic()),
+            Self::Input(input) => match input {
+                Input::LocalId(a) => write!(f, "local_id.{}", axis(a)),
+                Input::LocalIndex => f.write_str("local_index"),
+                Input::WorkgroupId(a) => write!(f, "workgroup_id.{}", axis(a)),
+                Input::NumWorkgroups(a) => write!(f, "num_workgroups.{}", axis(a)),
+                Input::ActiveLanes => f.write_str("active_lanes"),
+            },
+            Self::Move(c) => write!(f, "move.{}", class(c)),
+            Self::Table { table, class: c } => write!(f, "table.{} t{table}", class(c)),
+            Self::BufferLoad { buffer, offset, class: c, .. } => write!(f, "load.{} b{buffer}+{offset}", class(c)),
+            Self::BufferStore { buffer, offset, class: c } => write!(f, "store.{} b{buffer}+{offset}", class(c)),
+            Self::BufferLength { buffer, .. } => write!(f, "length b{buffer}"),
+            Self::BufferAtomic { buffer, offset, function } => write!(f, "atomic.{function:?} b{buffer}+{offset}"),
+            Self::MemoryLoad { memory, slot, class: c } => write!(f, "load.{} {memory:?}+{slot}", class(c)),
+            Self::MemoryStore { memory, slot, class: c } => write!(f, "store.{} {memory:?}+{slot}", class(c)),
+            Self::WorkgroupAtomic { slot, function } => write!(f, "atomic.{function:?} Workgroup+{slot}"),
+            Self::ImageLoad { access, .. } => write!(f, "image.load b{}", access.image),
+            Self::ImageStore { access, .. } => write!(f, "image.store b{}", access.image),
+            Self::ImageSample { access, sampler } => write!(f, "image.sample b{} b{sampler}", access.image),
+            Self::ImageQuery { image, query } => write!(f, "image.query b{image} {query:?}"),
+            Self::Barrier => f.write_str("barrier"),
+        }
+    }
+}

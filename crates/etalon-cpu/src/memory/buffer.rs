@@ -1,0 +1,82 @@
+//! Buffers.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::RunError;
+
+/// Bytes a kernel reads and writes, as 32-bit words.
+#[derive(Debug)]
+pub struct Buffer {
+    words: Vec<AtomicU32>,
+    bytes: u64,
+}
+
+impl Buffer {
+    /// A buffer of zeros.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn zeroed(bytes: u64) -> Result<Self, RunError> {
+        let out_of_memory = || RunError::OutOfMemory { what: "a buffer".to_owned(), bytes };
+        let count = usize::try_from(bytes.div_ceil(4)).map_err(|_| out_of_memory())?;
+        let mut words = Vec::new();
+        words.try_reserve_exact(count).map_err(|_| out_of_memory())?;
+        words.resize_with(count, || AtomicU32::new(0));
+        Ok(Self { words, bytes })
+    }
+
+    /// A buffer of the given bytes.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, RunError> {
+        let mut buffer = Self::zeroed(bytes.len() as u64)?;
+        buffer.write(bytes);
+        Ok(buffer)
+    }
+
+    /// Size in bytes.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Whether the buffer has no bytes.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.bytes == 0
+    }
+
+    /// Overwrites the start of the buffer; bytes beyond its end are ignored.
+    pub fn write(&mut self, bytes: &[u8]) {
+        for (word, chunk) in self.words.iter_mut().zip(bytes.chunks(4)) {
+            let mut value = word.get_mut().to_le_bytes();
+            value[..chunk.len()].copy_from_slice(chunk);
+            *word.get_mut() = u32::from_le_bytes(value);
+        }
+    }
+
+    /// Sets every byte to zero.
+    pub fn clear(&mut self) {
+        for word in &mut self.words {
+            *word.get_mut() = 0;
+        }
+    }
+
+    /// A copy of the bytes.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, RunError> {
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(self.words.len() * 4).map_err(|_| RunError::OutOfMemory { what: "a buffer's contents".to_owned(), bytes: self.bytes })?;
+        bytes.extend(self.words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()));
+        // Not more than the words hold.
+        bytes.truncate(self.bytes as usize);
+        Ok(bytes)
+    }
+
+    pub(crate) fn words(&self) -> &[AtomicU32] {
+        &self.words
+    }
+}

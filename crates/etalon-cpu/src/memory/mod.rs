@@ -1,0 +1,14 @@
+//! Textures and buffers that several workers can read and write at once.
+//!
+//! Memory is made of relaxed atomics of the texel's size: plain loads and
+//! stores for the processor, and well defined when invocations race.
+
+mod buffer;
+mod texel;
+mod texture;
+
+pub use buffer::Buffer;
+pub use texture::Texture;
+
+pub(crate) use texel::{decode, encode};
+pub(crate) use texture::{Level, Texels};

@@ -1,0 +1,246 @@
+//! Texels to channels and back for many lanes at once.
+//!
+//! The common formats have loops without branches; they give the same bits as
+//! the codec of [`etalon_core::texel`], which serves all others.
+
+use etalon_core::Format;
+use etalon_core::texel::Texel;
+
+use crate::num::{f16_to_f32, f32_to_f16};
+
+/// The words of `K` texels, low and high; formats of up to 8 bytes use the low one.
+pub(crate) type Words<const K: usize> = [[u64; K]; 2];
+
+/// Channels of `K` texels as bits: of `f32`, `i32` or `u32`.
+pub(crate) type Channels<const K: usize> = [[u32; K]; 4];
+
+/// Reads the channels that `wanted` asks for; the others are left alone.
+#[inline(always)]
+pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [bool; 4], out: &mut Channels<K>) {
+    let one = 1.0_f32.to_bits();
+    let [low, high] = words;
+    match format {
+        Format::R32Float | Format::Depth32Float => {
+            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            fill(wanted, out, 1, 0, one);
+        }
+        Format::R32Uint | Format::R32Sint => {
+            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            fill(wanted, out, 1, 0, 1);
+        }
+        Format::Rg32Float => {
+            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
+            fill(wanted, out, 2, 0, one);
+        }
+        Format::Rg32Uint | Format::Rg32Sint => {
+            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
+            fill(wanted, out, 2, 0, 1);
+        }
+        Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint => {
+            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
+            each(wanted[2], &mut out[2], |k| high[k] as u32);
+            each(wanted[3], &mut out[3], |k| (high[k] >> 32) as u32);
+        }
+        Format::R16Float => {
+            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            fill(wanted, out, 1, 0, one);
+        }
+        Format::Rg16Float => {
+            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each(wanted[1], &mut out[1], |k| f16_to_f32(low[k] as u32 >> 16).to_bits());
+            fill(wanted, out, 2, 0, one);
+        }
+        Format::Rgba16Float => {
+            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each(wanted[1], &mut out[1], |k| f16_to_f32(low[k] as u32 >> 16).to_bits());
+            each(wanted[2], &mut out[2], |k| f16_to_f32((low[k] >> 32) as u32 & 0xffff).to_bits());
+            each(wanted[3], &mut out[3], |k| f16_to_f32((low[k] >> 32) as u32 >> 16).to_bits());
+        }
+        Format::R8Unorm => {
+            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
+            fill(wanted, out, 1, 0, one);
+        }
+        Format::Rg8Unorm => {
+            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
+            each(wanted[1], &mut out[1], |k| unorm8(low[k] as u32 >> 8));
+            fill(wanted, out, 2, 0, one);
+        }
+        Format::Rgba8Unorm => {
+            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
+            each(wanted[1], &mut out[1], |k| unorm8(low[k] as u32 >> 8));
+            each(wanted[2], &mut out[2], |k| unorm8(low[k] as u32 >> 16));
+            each(wanted[3], &mut out[3], |k| unorm8(low[k] as u32 >> 24));
+        }
+        _ => {
+            for k in 0..K {
+                let mut bytes = [0; 16];
+                bytes[..8].copy_from_slice(&low[k].to_le_bytes());
+                bytes[8..].copy_from_slice(&high[k].to_le_bytes());
+                let channels = match format.decode(&bytes) {
+                    Texel::Float(channels) => channels.map(f32::to_bits),
+                    Texel::Sint(channels) => channels.map(|channel| channel as u32),
+                    Texel::Uint(channels) => channels,
+                };
+                for (lanes, channel) in out.iter_mut().zip(channels) {
+                    lanes[k] = channel;
+                }
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn each<const K: usize>(wanted: bool, out: &mut [u32; K], channel: impl Fn(usize) -> u32) {
+    if wanted {
+        for (k, lane) in out.iter_mut().enumerate() {
+            *lane = channel(k);
+        }
+    }
+}
+
+/// Channels that the format has not, from `first` on: 0, 0, 1.
+#[inline(always)]
+fn fill<const K: usize>(wanted: [bool; 4], out: &mut Channels<K>, first: usize, zero: u32, one: u32) {
+    for channel in first..4 {
+        if wanted[channel] {
+            out[channel] = [if channel == 3 { one } else { zero }; K];
+        }
+    }
+}
+
+#[inline(always)]
+fn unorm8(code: u32) -> u32 {
+    ((code & 0xff) as f32 / 255.0).to_bits()
+}
+
+/// Writes texels.
+#[inline(always)]
+pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out: &mut Words<K>) {
+    let [r, g, b, a] = channels;
+    match format {
+        Format::R32Float | Format::R32Uint | Format::R32Sint => words(&mut out[0], |k| u64::from(r[k])),
+        Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint => words(&mut out[0], |k| pair(r[k], g[k])),
+        Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint => {
+            words(&mut out[0], |k| pair(r[k], g[k]));
+            words(&mut out[1], |k| pair(b[k], a[k]));
+        }
+        Format::R16Float => words(&mut out[0], |k| u64::from(half(r[k]))),
+        Format::Rg16Float => words(&mut out[0], |k| u64::from(half(r[k]) | (half(g[k]) << 16))),
+        Format::Rgba16Float => words(&mut out[0], |k| pair(half(r[k]) | (half(g[k]) << 16), half(b[k]) | (half(a[k]) << 16))),
+        Format::R8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]))),
+        Format::Rg8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]) | (code8(g[k]) << 8))),
+        Format::Rgba8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))),
+        _ => {
+            for k in 0..K {
+                let bits = [r[k], g[k], b[k], a[k]];
+                let texel = match format.sample_kind() {
+                    etalon_core::format::SampleKind::Uint => Texel::Uint(bits),
+                    etalon_core::format::SampleKind::Sint => Texel::Sint(bits.map(|bits| bits as i32)),
+                    _ => Texel::Float(bits.map(f32::from_bits)),
+                };
+                let mut bytes = [0; 16];
+                format.encode(texel, &mut bytes);
+                let (mut low, mut high) = ([0; 8], [0; 8]);
+                low.copy_from_slice(&bytes[..8]);
+                high.copy_from_slice(&bytes[8..]);
+                out[0][k] = u64::from_le_bytes(low);
+                out[1][k] = u64::from_le_bytes(high);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn words<const K: usize>(out: &mut [u64; K], word: impl Fn(usize) -> u64) {
+    for (k, out) in out.iter_mut().enumerate() {
+        *out = word(k);
+    }
+}
+
+#[inline(always)]
+fn pair(low: u32, high: u32) -> u64 {
+    u64::from(low) | u64::from(high) << 32
+}
+
+#[inline(always)]
+fn half(bits: u32) -> u32 {
+    f32_to_f16(f32::from_bits(bits))
+}
+
+/// Clamped, scaled exactly, rounded to nearest even; NaN gives 0.
+#[inline(always)]
+fn code8(bits: u32) -> u32 {
+    let value = f64::from(f32::from_bits(bits)) * 255.0;
+    let value = if value > 0.0 { value } else { 0.0 };
+    let value = if value < 255.0 { value } else { 255.0 };
+    // The sum's unit is 1, so adding rounds to the nearest integer, ties to
+    // even, and leaves it in the low bits.
+    (value + 4_503_599_627_370_496.0).to_bits() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bits(k: u32) -> u32 {
+        k.wrapping_mul(0x9e37_79b1).rotate_left(k % 31)
+    }
+
+    /// Every format's loops against the codec, on arbitrary words.
+    #[test]
+    fn decoding_is_the_codec() {
+        for &format in Format::ALL {
+            for seed in 0..200 {
+                let word = |i: u32| u64::from(bits(seed * 64 + i)) | u64::from(bits(seed * 64 + i + 32)) << 32;
+                let words: Words<16> = [std::array::from_fn(|k| word(k as u32)), std::array::from_fn(|k| word(k as u32 + 16))];
+                let mut channels = [[0; 16]; 4];
+                decode(format, &words, [true; 4], &mut channels);
+                for k in 0..16 {
+                    let bytes: Vec<u8> = words[0][k].to_le_bytes().into_iter().chain(words[1][k].to_le_bytes()).collect();
+                    let expected = match format.decode(&bytes) {
+                        Texel::Float(c) => c.map(f32::to_bits),
+                        Texel::Sint(c) => c.map(|c| c as u32),
+                        Texel::Uint(c) => c,
+                    };
+                    assert_eq!(channels.map(|c| c[k]), expected, "{format} {:x}", words[0][k]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn encoding_is_the_codec() {
+        let special = [0.0, -0.0, 1.0, 0.5, 0.1, 2.0, -1.0, 65504.0, 65519.9, 65520.0, 1e-8, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.5 / 255.0, 1.5 / 255.0];
+        for &format in Format::ALL {
+            for seed in 0..200 {
+                let lane = |c: u32| -> [u32; 16] { std::array::from_fn(|k| if seed == 0 { special[(k + c as usize) % 16].to_bits() } else { bits(seed * 64 + k as u32 * 4 + c) }) };
+                let channels: Channels<16> = [lane(0), lane(1), lane(2), lane(3)];
+                let mut words = [[0; 16]; 2];
+                encode(format, &channels, &mut words);
+                for k in 0..16 {
+                    let texel = channels.map(|c| c[k]);
+                    let texel = match format.sample_kind() {
+                        etalon_core::format::SampleKind::Uint => Texel::Uint(texel),
+                        etalon_core::format::SampleKind::Sint => Texel::Sint(texel.map(|c| c as i32)),
+                        _ => Texel::Float(texel.map(f32::from_bits)),
+                    };
+                    let size = format.texel_bytes() as usize;
+                    let mut expected = vec![0; size];
+                    format.encode(texel, &mut expected);
+                    let bytes: Vec<u8> = words[0][k].to_le_bytes().into_iter().chain(words[1][k].to_le_bytes()).take(size).collect();
+                    assert_eq!(bytes, expected, "{format} {texel:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn unwanted_channels_are_left_alone() {
+        let mut channels = [[7; 4]; 4];
+        decode(Format::Rgba32Uint, &[[u64::MAX; 4]; 2], [false, true, false, false], &mut channels);
+        assert_eq!(channels, [[7; 4], [u32::MAX; 4], [7; 4], [7; 4]]);
+    }
+}

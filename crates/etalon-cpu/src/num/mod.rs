@@ -1,0 +1,268 @@
+//! What the interpreter computes with.
+//!
+//! Every handler of floating-point instructions is generic over [`Number`], so
+//! that the same bytecode can run in other number types than the GPU's `f32`.
+
+mod elementary;
+mod half;
+
+pub(crate) use elementary::{atan2, cos, exp, exp2, log, log2, pow, sin, tan};
+pub(crate) use half::{f16_to_f32, f32_to_f16};
+
+/// One lane of a floating-point register.
+///
+/// Integers, booleans and masks are the same in every number type; comparisons
+/// and conversions are where the two meet.
+pub(crate) trait Number: Copy + Default + Send + Sync + 'static {
+    fn from_f32(value: f32) -> Self;
+    fn to_f32(self) -> f32;
+
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    /// `x - y * trunc(x / y)`, WGSL's `%`.
+    fn rem(self, other: Self) -> Self;
+    /// The other operand when one is NaN, the second when they are equal.
+    fn min(self, other: Self) -> Self;
+    /// The other operand when one is NaN, the second when they are equal.
+    fn max(self, other: Self) -> Self;
+    fn pow(self, other: Self) -> Self;
+    fn atan2(self, other: Self) -> Self;
+    fn ldexp(self, exponent: i32) -> Self;
+
+    fn neg(self) -> Self;
+    fn abs(self) -> Self;
+    fn sign(self) -> Self;
+    fn floor(self) -> Self;
+    fn ceil(self) -> Self;
+    fn trunc(self) -> Self;
+    /// To the nearest integer, ties to even.
+    fn round(self) -> Self;
+    fn sqrt(self) -> Self;
+    fn exp(self) -> Self;
+    fn exp2(self) -> Self;
+    fn log(self) -> Self;
+    fn log2(self) -> Self;
+    fn sin(self) -> Self;
+    fn cos(self) -> Self;
+    fn tan(self) -> Self;
+    fn asin(self) -> Self;
+    fn acos(self) -> Self;
+    fn atan(self) -> Self;
+    fn sinh(self) -> Self;
+    fn cosh(self) -> Self;
+    fn tanh(self) -> Self;
+    fn asinh(self) -> Self;
+    fn acosh(self) -> Self;
+    fn atanh(self) -> Self;
+
+    fn eq(self, other: Self) -> bool;
+    fn lt(self, other: Self) -> bool;
+    fn le(self, other: Self) -> bool;
+
+    /// Truncates; out of range saturates, NaN gives 0.
+    fn to_i32(self) -> i32;
+    /// Truncates; out of range saturates, NaN gives 0.
+    fn to_u32(self) -> u32;
+    fn from_i32(value: i32) -> Self;
+    fn from_u32(value: u32) -> Self;
+
+    /// `self` where `mask` is all ones, `other` where it is all zeros.
+    fn select(mask: u32, yes: Self, no: Self) -> Self;
+}
+
+impl Number for f32 {
+    #[inline(always)]
+    fn from_f32(value: f32) -> Self {
+        value
+    }
+    #[inline(always)]
+    fn to_f32(self) -> f32 {
+        self
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self + other
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self - other
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self * other
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self / other
+    }
+    #[inline(always)]
+    fn rem(self, other: Self) -> Self {
+        self - other * Number::trunc(self / other)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Number::select(mask((self < other) | (other != other)), self, other)
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Number::select(mask((self > other) | (other != other)), self, other)
+    }
+    #[inline(always)]
+    fn pow(self, other: Self) -> Self {
+        pow(self, other)
+    }
+    #[inline(always)]
+    fn atan2(self, other: Self) -> Self {
+        atan2(self, other)
+    }
+    #[inline(always)]
+    fn ldexp(self, exponent: i32) -> Self {
+        // Both factors are normal f64 for every exponent that can matter, and
+        // the product of an f32 with them is exact, so there is one rounding.
+        let exponent = exponent.clamp(-400, 400);
+        let power = f64::from_bits(((exponent + 1023) as u64) << 52);
+        (f64::from(self) * power) as f32
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        -self
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f32::from_bits(self.to_bits() & 0x7fff_ffff)
+    }
+    #[inline(always)]
+    fn sign(self) -> Self {
+        let one = mask(self > 0.0) & 1.0_f32.to_bits();
+        let minus_one = mask(self < 0.0) & (-1.0_f32).to_bits();
+        f32::from_bits(one | minus_one)
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        self.floor()
+    }
+    #[inline(always)]
+    fn ceil(self) -> Self {
+        self.ceil()
+    }
+    #[inline(always)]
+    fn trunc(self) -> Self {
+        self.trunc()
+    }
+    #[inline(always)]
+    fn round(self) -> Self {
+        self.round_ties_even()
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        self.sqrt()
+    }
+    #[inline(always)]
+    fn exp(self) -> Self {
+        exp(self)
+    }
+    #[inline(always)]
+    fn exp2(self) -> Self {
+        exp2(self)
+    }
+    #[inline(always)]
+    fn log(self) -> Self {
+        log(self)
+    }
+    #[inline(always)]
+    fn log2(self) -> Self {
+        log2(self)
+    }
+    #[inline(always)]
+    fn sin(self) -> Self {
+        sin(self)
+    }
+    #[inline(always)]
+    fn cos(self) -> Self {
+        cos(self)
+    }
+    #[inline(always)]
+    fn tan(self) -> Self {
+        tan(self)
+    }
+    #[inline(always)]
+    fn asin(self) -> Self {
+        f64::from(self).asin() as f32
+    }
+    #[inline(always)]
+    fn acos(self) -> Self {
+        f64::from(self).acos() as f32
+    }
+    #[inline(always)]
+    fn atan(self) -> Self {
+        f64::from(self).atan() as f32
+    }
+    #[inline(always)]
+    fn sinh(self) -> Self {
+        f64::from(self).sinh() as f32
+    }
+    #[inline(always)]
+    fn cosh(self) -> Self {
+        f64::from(self).cosh() as f32
+    }
+    #[inline(always)]
+    fn tanh(self) -> Self {
+        f64::from(self).tanh() as f32
+    }
+    #[inline(always)]
+    fn asinh(self) -> Self {
+        f64::from(self).asinh() as f32
+    }
+    #[inline(always)]
+    fn acosh(self) -> Self {
+        f64::from(self).acosh() as f32
+    }
+    #[inline(always)]
+    fn atanh(self) -> Self {
+        f64::from(self).atanh() as f32
+    }
+
+    #[inline(always)]
+    fn eq(self, other: Self) -> bool {
+        self == other
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> bool {
+        self < other
+    }
+    #[inline(always)]
+    fn le(self, other: Self) -> bool {
+        self <= other
+    }
+
+    #[inline(always)]
+    fn to_i32(self) -> i32 {
+        self as i32
+    }
+    #[inline(always)]
+    fn to_u32(self) -> u32 {
+        self as u32
+    }
+    #[inline(always)]
+    fn from_i32(value: i32) -> Self {
+        value as f32
+    }
+    #[inline(always)]
+    fn from_u32(value: u32) -> Self {
+        value as f32
+    }
+
+    #[inline(always)]
+    fn select(mask: u32, yes: Self, no: Self) -> Self {
+        f32::from_bits((yes.to_bits() & mask) | (no.to_bits() & !mask))
+    }
+}
+
+/// All ones for true: how booleans are kept in integer registers.
+#[inline(always)]
+pub(crate) fn mask(condition: bool) -> u32 {
+    0_u32.wrapping_sub(u32::from(condition))
+}

@@ -1,0 +1,247 @@
+//! naga's IR into the [`crate::ir`] tree: calls inlined, composites taken
+//! apart, pointers resolved.
+
+mod builder;
+mod expression;
+mod image;
+mod layout;
+mod math;
+mod place;
+mod scan;
+mod statement;
+
+use std::collections::{HashMap, HashSet};
+
+use naga::valid::{FunctionInfo, ModuleInfo};
+use naga::{AddressSpace, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, Span, TypeInner};
+
+use self::builder::Builder;
+use self::layout::class_of;
+use self::place::Place;
+use crate::binding::{BindingInfo, describe_binding};
+use crate::ir::{Input, Op, ScopeId, Tree, Value, Variable};
+
+/// What went wrong; the place is the translator's current span.
+#[derive(Debug)]
+pub(crate) enum Fail {
+    Unsupported(String),
+    Invalid(String),
+    TooLarge { what: &'static str, size: u64, limit: u64 },
+}
+
+impl Fail {
+    pub(crate) fn unsupported(construct: impl Into<String>) -> Self {
+        Self::Unsupported(construct.into())
+    }
+
+    pub(crate) fn invalid(what: impl Into<String>) -> Self {
+        Self::Invalid(what.into())
+    }
+}
+
+/// A kernel as a tree, with what it needs bound.
+pub(crate) struct Translation {
+    pub(crate) tree: Tree,
+    pub(crate) bindings: Vec<BindingInfo>,
+}
+
+/// The meaning of an expression while translating.
+#[derive(Clone, Debug)]
+enum Operand {
+    /// A value, flattened into scalars.
+    Scalars(Vec<Value>),
+    /// A pointer.
+    Place(Place),
+    /// A texture or sampler, by its index in the bindings.
+    Resource(u16),
+}
+
+/// A function being inlined.
+struct Frame<'a> {
+    function: &'a Function,
+    info: &'a FunctionInfo,
+    arguments: Vec<Operand>,
+    operands: HashMap<Handle<Expression>, Operand>,
+    locals: HashMap<Handle<LocalVariable>, Place>,
+    result: Vec<Variable>,
+    scope: ScopeId,
+    /// Targets of `break` and `continue`, innermost last.
+    breaks: Vec<ScopeId>,
+    continues: Vec<ScopeId>,
+}
+
+pub(crate) struct Translator<'a> {
+    module: &'a Module,
+    info: &'a ModuleInfo,
+    builder: Builder,
+    bindings: Vec<BindingInfo>,
+    globals: HashMap<Handle<GlobalVariable>, Operand>,
+    constants: HashMap<Handle<Expression>, Vec<Value>>,
+    indexed: scan::Indexed,
+    /// Variables of `var<private>`s, which any call may change.
+    private_variables: Vec<Variable>,
+    workgroup_size: [u32; 3],
+}
+
+/// Translates the entry point of the given index.
+///
+/// On failure the span is of what could not be translated.
+pub(crate) fn translate(module: &Module, info: &ModuleInfo, entry_point: usize) -> Result<Translation, (Fail, Span)> {
+    let mut translator = Translator {
+        module,
+        info,
+        builder: Builder::new(),
+        bindings: Vec::new(),
+        globals: HashMap::new(),
+        constants: HashMap::new(),
+        indexed: scan::indexed(module),
+        private_variables: Vec::new(),
+        workgroup_size: module.entry_points[entry_point].workgroup_size,
+    };
+    match translator.entry_point(entry_point) {
+        Ok(()) => Ok(Translation { bindings: translator.bindings, tree: translator.builder.finish() }),
+        Err(fail) => Err((fail, translator.builder.span)),
+    }
+}
+
+impl<'a> Translator<'a> {
+    fn entry_point(&mut self, index: usize) -> Result<(), Fail> {
+        let entry = &self.module.entry_points[index];
+        let info = self.info.get_entry_point(index);
+        self.declare_globals(info)?;
+        let mut arguments = Vec::new();
+        for argument in &entry.function.arguments {
+            arguments.push(Operand::Scalars(self.entry_argument(argument.ty, argument.binding.as_ref())?));
+        }
+        let scope = self.builder.new_scope();
+        let mut frame = self.frame(&entry.function, info, arguments, scope)?;
+        self.builder.begin();
+        let falls_through = self.block(&mut frame, statement::Sequence::of(&entry.function.body), &[scope])?;
+        let body = self.builder.end(falls_through);
+        self.builder.finish_scope(scope, body);
+        Ok(())
+    }
+
+    fn frame(&mut self, function: &'a Function, info: &'a FunctionInfo, arguments: Vec<Operand>, scope: ScopeId) -> Result<Frame<'a>, Fail> {
+        let mut frame = Frame {
+            function,
+            info,
+            arguments,
+            operands: HashMap::new(),
+            locals: HashMap::new(),
+            result: Vec::new(),
+            scope,
+            breaks: Vec::new(),
+            continues: Vec::new(),
+        };
+        if let Some(result) = &function.result {
+            for leaf in self.leaves(self.inner(result.ty))? {
+                frame.result.push(self.builder.new_variable(leaf.class()));
+            }
+        }
+        let indexed = self.indexed.locals(function);
+        for (handle, local) in function.local_variables.iter() {
+            self.builder.span = function.local_variables.get_span(handle);
+            let place = self.private_place(self.inner(local.ty).clone(), indexed.contains(&handle))?;
+            let initial = match local.init {
+                Some(init) => self.scalars(&mut frame, init)?,
+                None => self.zero(self.inner(local.ty))?,
+            };
+            self.store(&place, &initial)?;
+            frame.locals.insert(handle, place);
+        }
+        Ok(frame)
+    }
+
+    fn declare_globals(&mut self, info: &FunctionInfo) -> Result<(), Fail> {
+        let mut names = HashSet::new();
+        for (handle, global) in self.module.global_variables.iter() {
+            if info[handle].is_empty() {
+                continue;
+            }
+            self.builder.span = self.module.global_variables.get_span(handle);
+            let ty = self.inner(global.ty);
+            let operand = match global.space {
+                AddressSpace::Uniform | AddressSpace::Storage { .. } | AddressSpace::Handle => {
+                    let index = u16::try_from(self.bindings.len()).map_err(|_| Fail::TooLarge { what: "number of bindings", size: self.bindings.len() as u64, limit: 1 << 16 })?;
+                    let binding = describe_binding(self.module, global)?;
+                    names.insert(binding.name.clone());
+                    let constant = !binding.is_writable();
+                    self.bindings.push(binding);
+                    match global.space {
+                        AddressSpace::Handle => Operand::Resource(index),
+                        _ => Operand::Place(Place::buffer(ty.clone(), index, constant)),
+                    }
+                }
+                AddressSpace::WorkGroup => Operand::Place(self.workgroup_place(ty.clone())?),
+                AddressSpace::Private => {
+                    let place = self.private_place(ty.clone(), self.indexed.globals.contains(&handle))?;
+                    let initial = match global.init {
+                        Some(init) => self.global_constant(init)?,
+                        None => self.zero(ty)?,
+                    };
+                    self.store(&place, &initial)?;
+                    self.private_variables.extend(place.variables());
+                    Operand::Place(place)
+                }
+                space => return Err(Fail::unsupported(format!("variables in the address space {space:?}"))),
+            };
+            self.globals.insert(handle, operand);
+        }
+        Ok(())
+    }
+
+    /// A built-in input, or a struct of them.
+    fn entry_argument(&mut self, ty: Handle<naga::Type>, binding: Option<&naga::Binding>) -> Result<Vec<Value>, Fail> {
+        match (binding, self.inner(ty)) {
+            (Some(naga::Binding::BuiltIn(builtin)), _) => self.builtin(*builtin),
+            (None, TypeInner::Struct { members, .. }) => {
+                let mut values = Vec::new();
+                for member in members {
+                    values.extend(self.entry_argument(member.ty, member.binding.as_ref())?);
+                }
+                Ok(values)
+            }
+            _ => Err(Fail::unsupported("inputs of compute shaders other than built-in ones")),
+        }
+    }
+
+    fn builtin(&mut self, builtin: naga::BuiltIn) -> Result<Vec<Value>, Fail> {
+        use naga::BuiltIn as B;
+        let size = self.workgroup_size;
+        let values = match builtin {
+            B::LocalInvocationId => (0..3).map(|axis| self.local_id(axis)).collect(),
+            B::LocalInvocationIndex => vec![self.input(Input::LocalIndex)],
+            B::WorkGroupId => (0..3).map(|axis| self.input(Input::WorkgroupId(axis))).collect(),
+            B::NumWorkGroups => (0..3).map(|axis| self.input(Input::NumWorkgroups(axis))).collect(),
+            B::GlobalInvocationId => (0..3_u8)
+                .map(|axis| {
+                    let size = self.builder.int(size[usize::from(axis)]);
+                    let group = self.input(Input::WorkgroupId(axis));
+                    let first = self.builder.arith(crate::ir::Arith::MulI, &[group, size]);
+                    let local = self.local_id(axis);
+                    self.builder.arith(crate::ir::Arith::AddI, &[first, local])
+                })
+                .collect(),
+            B::WorkGroupSize => size.iter().map(|&s| self.builder.int(s)).collect(),
+            other => return Err(Fail::unsupported(format!("the built-in input {other:?}"))),
+        };
+        Ok(values)
+    }
+
+    fn local_id(&mut self, axis: u8) -> Value {
+        if self.workgroup_size[usize::from(axis)] == 1 {
+            return self.builder.int(0);
+        }
+        self.input(Input::LocalId(axis))
+    }
+
+    fn input(&mut self, input: Input) -> Value {
+        self.builder.op(Op::Input(input), &[], &[crate::ir::Class::Int])[0]
+    }
+
+    /// The zero value of a type.
+    fn zero(&mut self, ty: &TypeInner) -> Result<Vec<Value>, Fail> {
+        Ok(self.leaves(ty)?.into_iter().map(|leaf| self.builder.constant(class_of(leaf.kind), 0)).collect())
+    }
+}

@@ -23,7 +23,7 @@ pub(super) const STRICT: &str = "strict";
 
 /// Most bytes of one file. Compilers count in 32 bits and recurse; real
 /// kernels are a hundred times smaller.
-const MAX_FILE_BYTES: usize = 4 << 20;
+const MAX_FILE_BYTES: usize = 1 << 20;
 
 /// What assembling a kernel gives.
 pub(super) struct Assembly {
@@ -113,6 +113,11 @@ pub(super) fn assemble(
             similar: similar(&variant.path, &sources.paths()),
         });
     }
+    if variant.features.contains_key(STRICT) {
+        return Err(KernelError::ReservedFeature {
+            kernel: variant.path.clone(),
+        });
+    }
     let flags = variant
         .features
         .iter()
@@ -164,9 +169,7 @@ fn check_features(
     }
     let missing = |known: &BTreeSet<String>| {
         let mut names = variant.features.keys();
-        names
-            .find(|name| *name == STRICT || !known.contains(*name))
-            .cloned()
+        names.find(|name| !known.contains(*name)).cloned()
     };
     if missing(&known).is_none() {
         return Ok(());
@@ -388,10 +391,7 @@ impl Resolver for Modules<'_> {
             return Err(refuse(0, message));
         }
         check::check_tokens(&text).map_err(|(offset, message)| refuse(offset, message))?;
-        check::check_nesting(&text).map_err(|offset| {
-            let message = format!("nested more than {} levels deep", check::MAX_NESTING);
-            refuse(offset, message)
-        })?;
+        check::check_nesting(&text).map_err(|(offset, message)| refuse(offset, message))?;
         self.parsed.set(self.parsed.get() + 1);
         // Blanks in front make the spans global offsets.
         let mut placed = " ".repeat(start);

@@ -94,56 +94,110 @@ fn number_problem(text: &str) -> Option<&'static str> {
 /// The most levels a kernel may nest, see [`check_nesting`].
 pub(crate) const MAX_NESTING: usize = 192;
 
-/// Finds the place where a text nests deeper than [`MAX_NESTING`].
+/// The most `<` behind names that may be open at once, see [`check_nesting`].
+pub(crate) const MAX_OPEN_ANGLES: usize = 8;
+
+/// The most `loop` statements within each other, see [`check_nesting`].
+pub(crate) const MAX_LOOPS: usize = 8;
+
+/// What an open bracket holds so far.
+#[derive(Default)]
+struct Level {
+    /// Operators of the current expression, and `else`s of the current ladder.
+    operators: usize,
+    /// `<` behind a name that may yet be a bracket.
+    angles: usize,
+    /// Whether it is the body of a `loop`.
+    body_of_loop: bool,
+}
+
+/// Finds the first place where a text nests too deeply, and says how.
 ///
 /// Compilers walk syntax trees recursively, so a hostile text could exhaust
 /// the stack, which cannot be caught. Brackets nest, and so does each operator
 /// of a chain (`a + b + c` is a tree of depth three) and each `else` of an
-/// `else if` ladder; all are counted.
-pub(crate) fn check_nesting(text: &str) -> Result<(), usize> {
-    // Levels the current statement and the ladder around it have added so far,
-    // for each open bracket.
-    let mut open: Vec<usize> = vec![0];
-    let mut total = 0_usize;
-    let reset = |open: &mut Vec<usize>, total: &mut usize| {
-        if let Some(level) = open.last_mut() {
-            *total -= *level;
-            *level = 0;
-        }
-    };
+/// `else if` ladder; all are counted against [`MAX_NESTING`].
+///
+/// WESL 0.4 takes time exponential in two more things: in how many `<` behind
+/// a name are within each other, since each may or may not be a template list
+/// and is tried, and in how many `loop`s are, since it evaluates the
+/// conditions in their bodies twice.
+pub(crate) fn check_nesting(text: &str) -> Result<(), (usize, String)> {
+    let mut levels = vec![Level::default()];
+    let mut before = "";
+    let mut loops_next = false;
     let mut tokens = tokens(text).peekable();
     while let Some(token) = tokens.next() {
+        let Some(level) = levels.last_mut() else {
+            return Ok(());
+        };
         match token.text {
             "(" | "[" | "{" => {
-                open.push(0);
-                total += 1;
+                let block = token.text == "{";
+                if block {
+                    level.angles = 0;
+                }
+                levels.push(Level {
+                    body_of_loop: block && std::mem::take(&mut loops_next),
+                    ..Level::default()
+                });
             }
             ")" | "]" | "}" => {
-                if open.len() > 1 {
-                    total -= open.pop().unwrap_or_default() + 1;
+                if levels.len() > 1 {
+                    levels.pop();
                 }
                 // A block ends a statement, unless a ladder goes on.
-                if token.text == "}" && tokens.peek().is_none_or(|t| t.text != "else") {
-                    reset(&mut open, &mut total);
+                if token.text == "}"
+                    && tokens.peek().is_none_or(|next| next.text != "else")
+                    && let Some(level) = levels.last_mut()
+                {
+                    level.operators = 0;
                 }
             }
-            ";" | "," => reset(&mut open, &mut total),
-            "else" => {
-                total += 1;
-                if let Some(level) = open.last_mut() {
-                    *level += 1;
+            ";" => {
+                level.operators = 0;
+                level.angles = 0;
+            }
+            "," => level.operators = 0,
+            ":" => level.angles = 0,
+            "loop" => loops_next = true,
+            "else" | "+" | "-" | "*" | "/" | "%" | "^" | "!" | "~" | "=" | "." => {
+                level.operators += 1;
+            }
+            "&" | "|" => {
+                level.operators += 1;
+                // `&&` and `||` are in no template list.
+                if before == token.text {
+                    level.angles = 0;
                 }
             }
-            "+" | "-" | "*" | "/" | "%" | "&" | "|" | "^" | "!" | "~" | "<" | ">" | "=" | "." => {
-                total += 1;
-                if let Some(level) = open.last_mut() {
-                    *level += 1;
+            "<" => {
+                level.operators += 1;
+                if before.starts_with(|c: char| c.is_alphabetic() || c == '_') {
+                    level.angles += 1;
                 }
+            }
+            ">" => {
+                level.operators += 1;
+                level.angles = level.angles.saturating_sub(1);
             }
             _ => {}
         }
-        if total > MAX_NESTING {
-            return Err(token.offset);
+        before = token.text;
+
+        let refuse = |message: String| Err((token.offset, message));
+        let nested = levels.len() - 1 + levels.iter().map(|it| it.operators).sum::<usize>();
+        if nested > MAX_NESTING {
+            return refuse(format!("nested more than {MAX_NESTING} levels deep"));
+        }
+        if levels.iter().map(|it| it.angles).sum::<usize>() > MAX_OPEN_ANGLES {
+            return refuse(format!(
+                "more than {MAX_OPEN_ANGLES} template lists or comparisons within each other; \
+                 name some of them"
+            ));
+        }
+        if levels.iter().filter(|it| it.body_of_loop).count() > MAX_LOOPS {
+            return refuse(format!("more than {MAX_LOOPS} `loop`s within each other"));
         }
     }
     Ok(())
@@ -244,10 +298,11 @@ mod tests {
             format!("let a = {}1;", "-".repeat(deep)),
             format!("let a = 1{};", "+1".repeat(deep)),
             format!("if a {{}} {}", "else if b { let c = 1; } ".repeat(deep)),
-            "array<".repeat(deep),
+            "1 < ".repeat(deep),
             "f(1+".repeat(deep / 2 + 1),
         ] {
-            assert!(check_nesting(&text).is_err(), "{text}");
+            let found = check_nesting(&text).unwrap_err();
+            assert!(found.1.contains("nested more than 192"), "{text}");
         }
         // The same amount side by side is no nesting.
         for text in [
@@ -255,10 +310,36 @@ mod tests {
             "a[1],".repeat(deep),
             "if a { b(); } ".repeat(deep),
             "let a = 1 + 2;".repeat(deep),
+            "let a = b < 2;".repeat(deep),
             "))))".repeat(deep),
         ] {
             assert_eq!(check_nesting(&text), Ok(()), "{text}");
         }
-        assert_eq!(check_nesting(&"(".repeat(deep)), Err(MAX_NESTING));
+        let place = check_nesting(&"(".repeat(deep)).map_err(|(at, _)| at);
+        assert_eq!(place, Err(MAX_NESTING));
+    }
+
+    #[test]
+    fn what_takes_exponential_time_is_bounded_more_tightly() {
+        for (open, limit) in [
+            ("array<", MAX_OPEN_ANGLES),
+            ("f(a < ", MAX_OPEN_ANGLES),
+            ("a < b, ", MAX_OPEN_ANGLES),
+            ("loop { ", MAX_LOOPS),
+            ("loop { if a { ", MAX_LOOPS),
+        ] {
+            assert_eq!(check_nesting(&open.repeat(limit)), Ok(()), "{open}");
+            assert!(check_nesting(&open.repeat(limit + 1)).is_err(), "{open}");
+        }
+        for text in [
+            "array<vec4<f32>, 9>(vec4<f32>(1), vec4<f32>(2), ".repeat(20),
+            "a < b && c > d || ".repeat(20),
+            "if a < b { while c < d {} ".repeat(20),
+            "if a < b { ".repeat(20),
+            "loop { break; } ".repeat(20),
+            "for (var i = 0; i < 4; i++) { ".repeat(20),
+        ] {
+            assert_eq!(check_nesting(&text), Ok(()), "{text}");
+        }
     }
 }

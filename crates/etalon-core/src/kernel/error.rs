@@ -83,6 +83,12 @@ pub enum KernelError {
         /// The features there are, besides `strict`.
         known: Vec<String>,
     },
+    /// The request sets the feature `strict`.
+    #[error("kernel `{kernel}`: the feature `strict` is set by the arithmetic, not by the request")]
+    ReservedFeature {
+        /// Path of the kernel.
+        kernel: String,
+    },
     /// The request sets a constant that the kernel does not declare.
     #[error(
         "kernel `{kernel}` has no override `{name}`; {}",
@@ -183,6 +189,7 @@ impl KernelError {
             Self::NotStrict { findings, .. } => findings.first().map(|found| &found.location),
             Self::UnknownKernel { .. }
             | Self::UnknownFeature { .. }
+            | Self::ReservedFeature { .. }
             | Self::UnknownConstant { .. }
             | Self::EntryPoint { .. }
             | Self::Spirv { .. }

@@ -21,6 +21,14 @@
 //! textures, `f64`, …) are refused, since a kernel has to run on all of them;
 //! so is everything that depends on how invocations are laid out in hardware.
 //!
+//! Every resource is in group 0 with an explicit `@binding`; names are what
+//! passes refer to. There is at most one `var<uniform>`, a structure of
+//! numbers, vectors, matrices and arrays of those. Note that WGSL reserves
+//! some handy words, `target` among them. Identifiers are ASCII.
+//!
+//! `import package::lib::colour::luminance;` imports from
+//! `lib/colour.wesl`; a feature that a request does not mention is off.
+//!
 //! # Strict and fast
 //!
 //! [`Arithmetic`] sets the WESL feature `strict`. A kernel compiled strict

@@ -325,13 +325,14 @@ fn an_unknown_kernel_is_told_with_similar_ones() {
 fn unknown_features_and_constants_list_what_exists() {
     let library = example();
     let get = |request: KernelRequest| library.get(&request, Arithmetic::Strict).unwrap_err();
-    for name in ["extar", "strict"] {
-        let error = get(request().feature(name, true));
-        assert_eq!(
-            error.to_string(),
-            format!("kernel `test/kernel` has no feature `{name}`; it has `extra`")
-        );
-    }
+    assert_eq!(
+        get(request().feature("extar", true)).to_string(),
+        "kernel `test/kernel` has no feature `extar`; it has `extra`"
+    );
+    assert_eq!(
+        get(request().feature("strict", true)).to_string(),
+        "kernel `test/kernel`: the feature `strict` is set by the arithmetic, not by the request"
+    );
     let error = get(request().constant("radius", 1.0));
     assert_eq!(
         error.to_string(),
@@ -603,7 +604,7 @@ fn what_devices_may_lack_is_refused() {
 }
 
 /// The limit on nesting holds back what would exhaust a stack, and what is
-/// within the limit does not.
+/// just within the limit does not: this test would not end well otherwise.
 #[test]
 fn deep_nesting_is_refused_before_it_exhausts_the_stack() {
     let nested = |depth: usize, open: &str, close: &str| {
@@ -614,22 +615,52 @@ fn deep_nesting_is_refused_before_it_exhausts_the_stack() {
         ("-(", ")"),
         ("f32(", ")"),
         ("1.0 + ", ""),
+        ("1.0 < ", ""),
         ("!", ""),
+        ("- ", ""),
         ("v[u32(", ")]"),
+        ("array<", ">"),
+        ("", ".x"),
     ] {
         let deep = error_of(&nested(100_000, open, close));
-        assert!(deep.to_string().contains("nested more than"), "{deep}");
-        // The most of it that is allowed may be wrong in other ways.
-        let most = check::MAX_NESTING / (open.len() + close.len()) - 12;
+        assert!(deep.to_string().contains("more than"), "{deep}");
+        let fits = |depth: &usize| check::check_nesting(&nested(*depth, open, close)).is_ok();
+        let most = (0..=check::MAX_NESTING).take_while(fits).last().unwrap();
+        assert!(most >= 8, "{open}: {most}");
+        // It may be wrong in other ways.
         if let Err(error) = compile_one(&nested(most, open, close), Arithmetic::Fast) {
             assert!(!matches!(error, KernelError::Internal { .. }), "{error}");
-            assert!(!error.to_string().contains("nested more than"), "{error}");
         }
     }
-    let blocks = format!(
-        "@compute @workgroup_size(1) fn main() {{ {} {} }}",
-        "{".repeat(100),
-        "}".repeat(100)
+    for block in [
+        "{",
+        "if true {",
+        "loop { break; ",
+        "switch 1 { default {",
+        "while true {",
+    ] {
+        let close = "}".repeat(block.matches('{').count());
+        let blocks = |depth: usize| {
+            format!(
+                "@compute @workgroup_size(1) fn main() {{ {} {} }}",
+                block.repeat(depth),
+                close.repeat(depth)
+            )
+        };
+        compile_one(&blocks(check::MAX_LOOPS), Arithmetic::Fast)
+            .unwrap_or_else(|error| panic!("{error}"));
+        let deep = error_of(&blocks(100_000));
+        assert!(deep.to_string().contains("more than"), "{deep}");
+    }
+    let ladder = format!(
+        "@compute @workgroup_size(1) fn main() {{ if false {{}} {} }}",
+        "else if false {}".repeat(100)
     );
-    compile_one(&blocks, Arithmetic::Fast).unwrap();
+    compile_one(&ladder, Arithmetic::Fast).unwrap_or_else(|error| panic!("{error}"));
+}
+
+#[test]
+fn a_file_that_is_too_large_is_not_read() {
+    let error = error_of(&" ".repeat((1 << 20) + 1));
+    assert!(error.to_string().contains("over the limit"), "{error}");
 }

@@ -1,0 +1,534 @@
+//! An engine lends its device, its images and its command buffers.
+
+mod common;
+
+use std::collections::VecDeque;
+
+use ash::vk;
+use common::engine::{Engine, EngineBuffer};
+use etalon_ash::{
+    AdoptedBuffer, AdoptedTexture, AshBackend, AshBindings, AshOptions, BufferState, Features,
+    TextureState,
+};
+use etalon_core::Format;
+use etalon_core::backend::{Backend, BackendError};
+use etalon_core::graph::{ClearValue, Graph};
+use etalon_core::plan::Capture;
+use etalon_core::resource::{BufferDesc, TextureDesc};
+
+/// As clears leave it.
+const CLEARED: TextureState = TextureState {
+    layout: vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+    stages: vk::PipelineStageFlags2::CLEAR,
+    access: vk::AccessFlags2::TRANSFER_WRITE,
+};
+
+/// As copies want it.
+const COPIED: TextureState = TextureState {
+    layout: vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+    stages: vk::PipelineStageFlags2::COPY,
+    access: vk::AccessFlags2::TRANSFER_READ,
+};
+
+const DESC: TextureDesc = TextureDesc::d2(20, 12, Format::R32Float);
+
+/// Adopts the engine's device.
+fn adopt(engine: &Engine, options: AshOptions) -> AshBackend {
+    // SAFETY: the tests drop the backend before they finish the engine, and
+    // wait for what they submit.
+    unsafe { AshBackend::adopt(engine.lend(), options) }.unwrap()
+}
+
+/// Runs a test with an engine on each device, and fails if the validation
+/// layer has anything to say until the engine is gone.
+fn on_each(test: impl Fn(&Engine)) {
+    for device in common::devices() {
+        println!("on {device}");
+        let engine = Engine::new(&device);
+        test(&engine);
+        let messages = engine.finish();
+        assert!(messages.is_empty(), "{}", messages.join("\n\n"));
+    }
+}
+
+/// result = source + offset + what the history holds; the history holds that.
+fn accumulate(offset: f32) -> Graph {
+    let mut graph = Graph::new();
+    let source = graph.import_texture("source", DESC).unwrap();
+    let history = graph
+        .history("sum", DESC, ClearValue::Float([0.0; 4]))
+        .unwrap();
+    let shifted = graph.texture("shifted", DESC);
+    let shifted = graph
+        .compute("test/add")
+        .read("source", source)
+        .write("result", shifted)
+        .set("offset", offset)
+        .per_texel("result")
+        .unwrap();
+    let sum = graph
+        .compute("test/sum_of")
+        .read("first", shifted)
+        .read("second", history.previous)
+        .write("result", history.current)
+        .per_texel("result")
+        .unwrap();
+    let result = graph.texture("result", DESC);
+    let result = graph
+        .compute("test/add")
+        .named("hand over")
+        .read("source", sum)
+        .write("result", result)
+        .set("offset", 0.0_f32)
+        .per_texel("result")
+        .unwrap();
+    graph.output("result", result).unwrap();
+    graph
+}
+
+fn bytes(desc: TextureDesc) -> u64 {
+    desc.bytes().unwrap()
+}
+
+#[test]
+fn images_of_the_engine_go_in_and_out() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let input = engine.image(
+            DESC,
+            vk::ImageUsageFlags::SAMPLED
+                | vk::ImageUsageFlags::TRANSFER_DST
+                | vk::ImageUsageFlags::TRANSFER_SRC,
+        );
+        let output = engine.image(
+            DESC,
+            vk::ImageUsageFlags::SAMPLED
+                | vk::ImageUsageFlags::STORAGE
+                | vk::ImageUsageFlags::TRANSFER_SRC,
+        );
+        // SAFETY: as described, and dropped before the engine.
+        let (source, result) = unsafe {
+            (
+                backend.adopt_texture(input.adopted()).unwrap(),
+                backend.adopt_texture(output.adopted()).unwrap(),
+            )
+        };
+        let (seen, kept) = (engine.buffer(bytes(DESC)), engine.buffer(bytes(DESC)));
+        for (frame, total) in [(1, 3.5), (2, 8.0)] {
+            let plan = common::plan(&backend, &accumulate(0.5 * frame as f32), Capture::None);
+            let commands = engine.begin();
+            engine.fill(commands, &input, 2.0 + frame as f32);
+            let bindings = AshBindings::new()
+                .texture_in("source", &source, CLEARED, COPIED)
+                .output_to("result", &result, COPIED, COPIED);
+            // SAFETY: the command buffer is being recorded, and the states are
+            // those `fill` and the frame before have left.
+            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+            let left = outputs.textures["result"];
+            assert_eq!(left.image, output.image);
+            assert_eq!((left.desc, left.state), (DESC, COPIED));
+            engine.download(commands, output.image, DESC, &seen);
+            engine.download(commands, input.image, DESC, &kept);
+            engine.wait(engine.submit(commands));
+            assert_eq!(engine.floats(&seen), vec![total; 240]);
+            assert_eq!(engine.floats(&kept), vec![2.0 + frame as f32; 240]);
+        }
+    });
+}
+
+#[test]
+fn outputs_can_be_the_backends_own() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let input = engine.image(
+            DESC,
+            vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+        );
+        // SAFETY: as described, and dropped before the engine.
+        let source = unsafe { backend.adopt_texture(input.adopted()) }.unwrap();
+        let seen = engine.buffer(bytes(DESC));
+        // What the engine does between frames, and which barriers it leaves to
+        // the backend.
+        for (state, total) in [
+            (COPIED, 2.0),
+            (TextureState::FRAGMENT_SAMPLED, 4.0),
+            (TextureState::REST, 6.0),
+        ] {
+            let plan = common::plan(&backend, &accumulate(1.0), Capture::None);
+            let commands = engine.begin();
+            engine.fill(commands, &input, 1.0);
+            let bindings = AshBindings::new()
+                .texture_in("source", &source, CLEARED, TextureState::REST)
+                .output_in("result", state);
+            // SAFETY: as in the other tests.
+            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+            let left = outputs.textures["result"];
+            assert_eq!(left.state, state);
+            assert_ne!(left.view, vk::ImageView::null());
+            let to = |state: TextureState| (state.stages, state.access);
+            if state.layout != COPIED.layout {
+                engine.barrier(
+                    commands,
+                    left.image,
+                    (state.layout, COPIED.layout),
+                    to(state),
+                    to(COPIED),
+                );
+            }
+            engine.download(commands, left.image, DESC, &seen);
+            if state.layout != COPIED.layout {
+                engine.barrier(
+                    commands,
+                    left.image,
+                    (COPIED.layout, state.layout),
+                    to(COPIED),
+                    to(state),
+                );
+            }
+            engine.wait(engine.submit(commands));
+            assert_eq!(engine.floats(&seen), vec![total; 240], "{state:?}");
+        }
+    });
+}
+
+#[test]
+fn frames_in_flight_do_not_disturb_each_other() {
+    on_each(|engine| {
+        let frames_in_flight = 3;
+        let options = AshOptions {
+            frames_in_flight,
+            ..AshOptions::default()
+        };
+        let mut backend = adopt(engine, options);
+        // The engine takes turns with two images.
+        let inputs: Vec<_> = (0..2)
+            .map(|_| {
+                engine.image(
+                    DESC,
+                    vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+                )
+            })
+            .collect();
+        let sources: Vec<_> = inputs
+            .iter()
+            // SAFETY: as described, and dropped before the engine.
+            .map(|image| unsafe { backend.adopt_texture(image.adopted()) }.unwrap())
+            .collect();
+        let frames: u32 = 12;
+        let seen: Vec<EngineBuffer> = (0..frames).map(|_| engine.buffer(bytes(DESC))).collect();
+        let mut under_way = VecDeque::new();
+        let mut counters = Vec::new();
+        for frame in 0..frames {
+            if under_way.len() == frames_in_flight as usize {
+                engine.wait(under_way.pop_front().unwrap());
+            }
+            let turn = frame as usize % 2;
+            let plan = common::plan(&backend, &accumulate(frame as f32), Capture::None);
+            let commands = engine.begin();
+            engine.fill(commands, &inputs[turn], 100.0);
+            let bindings = AshBindings::new()
+                .texture_in("source", &sources[turn], CLEARED, TextureState::REST)
+                .output_in("result", COPIED);
+            // SAFETY: no more than the promised number are under way.
+            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+            let image = outputs.textures["result"].image;
+            engine.download(commands, image, DESC, &seen[frame as usize]);
+            under_way.push_back(engine.submit(commands));
+            counters.push(backend.counters());
+        }
+        for fence in under_way {
+            engine.wait(fence);
+        }
+        let mut total = 0.0;
+        for (frame, seen) in seen.iter().enumerate() {
+            total += 100.0 + frame as f32;
+            assert_eq!(engine.floats(seen), vec![total; 240], "frame {frame}");
+        }
+        // Two images in turn with the two sides of the history.
+        let (warm, last) = (counters[3], counters[frames as usize - 1]);
+        assert_eq!(warm.allocations, last.allocations);
+        assert_eq!(warm.bytes, last.bytes);
+        assert_eq!(warm.pipelines, last.pipelines);
+        assert_eq!(warm.bind_groups, last.bind_groups);
+        assert_eq!((warm.textures, warm.buffers), (last.textures, last.buffers));
+        assert_eq!(last.dispatches - warm.dispatches, 3 * u64::from(frames - 4));
+    });
+}
+
+#[test]
+fn textures_made_anew_in_every_frame_do_not_pile_up() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let mut warm = None;
+        let seen = engine.buffer(bytes(DESC));
+        for frame in 0..12 {
+            let input = engine.image(
+                DESC,
+                vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+            );
+            // SAFETY: as described, and dropped before the engine.
+            let source = unsafe { backend.adopt_texture(input.adopted()) }.unwrap();
+            backend.reset_histories();
+            let plan = common::plan(&backend, &accumulate(1.0), Capture::None);
+            let commands = engine.begin();
+            engine.fill(commands, &input, frame as f32);
+            let bindings = AshBindings::new()
+                .texture_in("source", &source, CLEARED, TextureState::REST)
+                .output_in("result", COPIED);
+            // SAFETY: as in the other tests.
+            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+            engine.download(commands, outputs.textures["result"].image, DESC, &seen);
+            engine.wait(engine.submit(commands));
+            assert_eq!(engine.floats(&seen), vec![frame as f32 + 1.0; 240]);
+            let counters = backend.counters();
+            if frame == 6 {
+                warm = Some(counters);
+            }
+            if let Some(warm) = warm {
+                assert_eq!(
+                    counters.bind_groups, warm.bind_groups,
+                    "sets are used again"
+                );
+                assert_eq!(counters.bytes, warm.bytes, "histories are let go");
+            }
+        }
+    });
+}
+
+#[test]
+fn buffers_of_the_engine_go_in_and_out() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let mut graph = Graph::new();
+        let desc = BufferDesc { bytes: 256 };
+        let source = graph.import_buffer("source", desc).unwrap();
+        let ramp = graph
+            .compute("test/ramp")
+            .write_buffer("values", source)
+            .groups([1, 1, 1])
+            .unwrap()
+            .buffer("values")
+            .unwrap();
+        let result = graph.buffer("result", desc);
+        let result = graph
+            .compute("test/copy_values")
+            .read_buffer("source", ramp)
+            .write_buffer("result", result)
+            .groups([1, 1, 1])
+            .unwrap()
+            .buffer("result")
+            .unwrap();
+        graph.output_buffer("result", result).unwrap();
+        // SAFETY: the physical device is the engine's.
+        let limits = unsafe {
+            engine
+                .instance
+                .get_physical_device_properties(engine.physical)
+        }
+        .limits;
+        let offset = limits.min_storage_buffer_offset_alignment.max(4);
+        let memory = engine.buffer(offset + 256);
+        let target = engine.buffer(256);
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let part = AdoptedBuffer {
+            buffer: memory.buffer,
+            offset,
+            bytes: 256,
+            usage,
+        };
+        let whole = AdoptedBuffer {
+            buffer: target.buffer,
+            offset: 0,
+            ..part
+        };
+        // SAFETY: as described, and dropped before the engine.
+        let (source, result) = unsafe {
+            (
+                backend.adopt_buffer(part).unwrap(),
+                backend.adopt_buffer(whole).unwrap(),
+            )
+        };
+        let host = BufferState {
+            stages: vk::PipelineStageFlags2::HOST,
+            access: vk::AccessFlags2::HOST_READ,
+        };
+        let plan = common::plan(&backend, &graph, Capture::None);
+        let commands = engine.begin();
+        let bindings = AshBindings::new()
+            .buffer_in("source", &source, host, host)
+            .output_to_buffer("result", &result, host, host);
+        // SAFETY: as in the other tests.
+        let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+        assert_eq!(outputs.buffers["result"].buffer, target.buffer);
+        engine.wait(engine.submit(commands));
+        let expected: Vec<u8> = (0..64_u32)
+            .flat_map(|i| (3 * i + 1).to_le_bytes())
+            .collect();
+        assert_eq!(engine.read(&target), expected);
+        assert_eq!(engine.read(&memory)[offset as usize..], expected);
+
+        // SAFETY: they are refused.
+        unsafe {
+            for wrong in [
+                AdoptedBuffer { offset: 2, ..part },
+                AdoptedBuffer { bytes: 0, ..part },
+                AdoptedBuffer { bytes: 255, ..part },
+                AdoptedBuffer {
+                    bytes: u64::MAX - 3,
+                    ..part
+                },
+            ] {
+                assert!(backend.adopt_buffer(wrong).is_err(), "{wrong:?}");
+            }
+        }
+    });
+}
+
+#[test]
+fn wrong_bindings_are_named_before_anything_is_made() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let other_backend = adopt(engine, AshOptions::default());
+        let usage = vk::ImageUsageFlags::SAMPLED
+            | vk::ImageUsageFlags::STORAGE
+            | vk::ImageUsageFlags::TRANSFER_DST;
+        let fine = engine.image(DESC, usage);
+        let wide = engine.image(TextureDesc::d2(21, 12, Format::R32Float), usage);
+        let opaque = engine.image(DESC, vk::ImageUsageFlags::TRANSFER_DST);
+        // SAFETY: as described, and dropped before the engine.
+        let (fine, wide, opaque, foreign) = unsafe {
+            (
+                backend.adopt_texture(fine.adopted()).unwrap(),
+                backend.adopt_texture(wide.adopted()).unwrap(),
+                backend.adopt_texture(opaque.adopted()).unwrap(),
+                other_backend.adopt_texture(fine.adopted()).unwrap(),
+            )
+        };
+        let plan = common::plan(&backend, &accumulate(1.0), Capture::None);
+        let before = backend.counters();
+        let commands = engine.begin();
+        let mut error = |plan: &etalon_core::plan::Plan, bindings: &AshBindings<'_>| {
+            // SAFETY: as in the other tests.
+            unsafe { backend.record(commands, plan, bindings) }.unwrap_err()
+        };
+        let missing = error(&plan, &AshBindings::new());
+        assert!(
+            matches!(&missing, BackendError::MissingInput { name } if name == "source"),
+            "{missing}"
+        );
+        for (texture, given, wanted) in [
+            (&wide, "21×12", "20×12"),
+            (&opaque, "TRANSFER_DST", "SAMPLED"),
+            (&foreign, "another device", "this backend"),
+        ] {
+            let mismatch = error(&plan, &AshBindings::new().texture("source", texture));
+            let text = mismatch.to_string();
+            assert!(
+                matches!(mismatch, BackendError::InputMismatch { .. }),
+                "{text}"
+            );
+            assert!(text.contains(given) && text.contains(wanted), "{text}");
+        }
+        let rest = TextureState::REST;
+        let twice = AshBindings::new()
+            .texture("source", &fine)
+            .output_to("result", &fine, rest, rest);
+        let twice = error(&plan, &twice).to_string();
+        assert!(
+            twice.contains("source") && twice.contains("result"),
+            "{twice}"
+        );
+        let mut captured = plan.clone();
+        captured.steps.push(etalon_core::plan::PlannedStep {
+            name: "capture it".to_owned(),
+            reason: String::new(),
+            barriers: Vec::new(),
+            step: etalon_core::plan::Step::Capture {
+                resource: 0,
+                range: etalon_core::graph::Subresources {
+                    mip: 0,
+                    mips: 1,
+                    layer: 0,
+                    layers: 1,
+                },
+                pass: String::new(),
+                binding: String::new(),
+            },
+        });
+        let refused = error(&captured, &AshBindings::new().texture("source", &fine));
+        assert!(
+            matches!(&refused, BackendError::Unsupported { step, .. } if step == "capture it"),
+            "{refused}"
+        );
+        assert_eq!(backend.counters(), before);
+        engine.wait(engine.submit(commands));
+    });
+}
+
+#[test]
+fn features_that_are_missing_are_named() {
+    on_each(|engine| {
+        let mut lent = engine.lend();
+        lent.features = Features::default();
+        // SAFETY: it is refused.
+        let error = unsafe { AshBackend::adopt(lent, AshOptions::default()) }.unwrap_err();
+        let BackendError::NoDevice { reason, .. } = error else {
+            panic!("{error}");
+        };
+        assert!(reason.contains("synchronization2"), "{reason}");
+        assert!(reason.contains("maintenance4"), "{reason}");
+        let mut lent = engine.lend();
+        lent.queue_family = 77;
+        // SAFETY: it is refused.
+        let error = unsafe { AshBackend::adopt(lent, AshOptions::default()) }.unwrap_err();
+        assert!(error.to_string().contains("77"), "{error}");
+
+        // Lent without the formats beyond WebGPU's.
+        let mut backend = adopt(engine, AshOptions::default());
+        assert!(!backend.limits().extended_storage_formats);
+        let mut graph = Graph::new();
+        let result = graph.texture("result", DESC.with_format(Format::R16Float));
+        let result = graph
+            .compute("test/half")
+            .write("result", result)
+            .per_texel("result")
+            .unwrap();
+        graph.output("result", result).unwrap();
+        let mut options = etalon_core::plan::PlanOptions {
+            limits: backend.limits(),
+            ..etalon_core::plan::PlanOptions::default()
+        };
+        let kernels = common::kernels();
+        assert!(etalon_core::plan::Plan::new(&graph, &kernels, &options).is_err());
+        options.limits.extended_storage_formats = true;
+        let plan = etalon_core::plan::Plan::new(&graph, &kernels, &options).unwrap();
+        let error = backend
+            .execute(&plan, &etalon_core::backend::Inputs::new())
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("shaderStorageImageExtendedFormats") && error.contains("test/half"),
+            "{error}"
+        );
+    });
+}
+
+#[test]
+fn an_image_no_device_can_have_is_refused() {
+    on_each(|engine| {
+        let backend = adopt(engine, AshOptions::default());
+        let impossible = AdoptedTexture {
+            image: vk::Image::null(),
+            desc: TextureDesc::d2(u32::MAX, 1, Format::R32Float),
+            usage: vk::ImageUsageFlags::SAMPLED,
+        };
+        // SAFETY: it is refused.
+        let error = unsafe { backend.adopt_texture(impossible) }.unwrap_err();
+        assert!(
+            matches!(error, BackendError::InputMismatch { .. }),
+            "{error}"
+        );
+    });
+}

@@ -28,7 +28,11 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Writes the source line below a message, with a caret below the column.
+/// The most characters of a source line that are shown.
+const EXCERPT: usize = 120;
+
+/// Writes the source line below a message, with a caret below the column. Of
+/// a long line, the part around the column is shown.
 pub(super) fn write_excerpt(
     f: &mut fmt::Formatter<'_>,
     location: &SourceLocation,
@@ -37,15 +41,27 @@ pub(super) fn write_excerpt(
     if line.trim().is_empty() {
         return Ok(());
     }
-    let number = location.line.to_string();
-    let margin = " ".repeat(number.len());
+    let column = location.column.saturating_sub(1) as usize;
+    // As much before the column as behind it, if there is that much.
+    let length = line.chars().count();
+    let start = column
+        .saturating_sub(EXCERPT / 2)
+        .min(length.saturating_sub(EXCERPT));
+    let shown: String = line.chars().skip(start).take(EXCERPT).collect();
+    let before = if start > 0 { "…" } else { "" };
+    let after = if start + EXCERPT < length { "…" } else { "" };
     // Tabs are kept, so that the caret stays below its column.
-    let indent: String = line
+    let indent: String = before
         .chars()
-        .take(location.column.saturating_sub(1) as usize)
+        .chain(shown.chars().take(column - start))
         .map(|c| if c == '\t' { '\t' } else { ' ' })
         .collect();
-    write!(f, "\n{number} | {line}\n{margin} | {indent}^")
+    let number = location.line.to_string();
+    let margin = " ".repeat(number.len());
+    write!(
+        f,
+        "\n{number} | {before}{shown}{after}\n{margin} | {indent}^"
+    )
 }
 
 /// Why a kernel could not be compiled.
@@ -232,4 +248,54 @@ fn each(findings: &[Finding]) -> String {
         .iter()
         .map(|finding| format!("\n{finding}"))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shown(line: &str, column: u32) -> String {
+        let location = SourceLocation {
+            file: "a.wesl".to_owned(),
+            line: 7,
+            column,
+        };
+        let message = "no".to_owned();
+        let line = line.to_owned();
+        let diagnostic = Diagnostic {
+            location,
+            message,
+            line,
+        };
+        diagnostic.to_string()
+    }
+
+    #[test]
+    fn the_caret_is_below_the_column() {
+        assert_eq!(
+            shown("let é = 1;", 9),
+            "a.wesl:7:9: no\n7 | let é = 1;\n  |         ^"
+        );
+        assert_eq!(shown("\tx", 2), "a.wesl:7:2: no\n7 | \tx\n  | \t^");
+        assert_eq!(shown("  ", 1), "a.wesl:7:1: no");
+        // Behind the end of the line.
+        assert_eq!(shown("x", 2), "a.wesl:7:2: no\n7 | x\n  |  ^");
+    }
+
+    #[test]
+    fn of_a_long_line_the_part_around_the_column_is_shown() {
+        let line: String = (0..1000)
+            .map(|i| if i == 500 { '#' } else { '.' })
+            .collect();
+        for (column, before, after) in [(501, true, true), (1, false, true), (1000, true, false)] {
+            let shown = shown(&line, column);
+            let lines: Vec<&str> = shown.lines().collect();
+            assert!(lines[1].chars().count() <= EXCERPT + 6, "{shown}");
+            assert_eq!(lines[1].starts_with("7 | …"), before, "{shown}");
+            assert_eq!(lines[1].ends_with('…'), after, "{shown}");
+            let caret = lines[2].chars().position(|c| c == '^').unwrap();
+            let above = lines[1].chars().nth(caret).unwrap();
+            assert_eq!(above == '#', column == 501, "{shown}");
+        }
+    }
 }

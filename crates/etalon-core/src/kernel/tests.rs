@@ -4,6 +4,7 @@ mod compile;
 mod embedded;
 mod interface;
 mod places;
+mod refusals;
 #[cfg(feature = "spirv")]
 mod spirv;
 mod strict;

@@ -28,6 +28,7 @@
 pub mod camera;
 pub mod exr_frame;
 pub mod frame;
+mod import;
 pub mod picture;
 pub mod scenes;
 pub mod trace;

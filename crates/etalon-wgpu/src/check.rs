@@ -16,6 +16,7 @@ use etalon_core::resource::{Dimension, TextureDesc};
 
 use crate::convert;
 use crate::fault::unsupported;
+use crate::gl;
 use crate::gpu::Gpu;
 use crate::pipeline::uniform_bytes;
 
@@ -39,6 +40,9 @@ pub(crate) fn check(gpu: &Gpu, plan: &Plan) -> Result<(), BackendError> {
     for step in &plan.steps {
         let checker = Checker { gpu, plan, step };
         checker.check()?;
+    }
+    if gpu.is_gl() {
+        gl::check(plan)?;
     }
     for history in &plan.histories {
         for index in [history.previous, history.current] {
@@ -127,23 +131,25 @@ pub(crate) fn check_buffer_copy(gpu: &Gpu, desc: &TextureDesc, back: bool) -> Re
     if depth && !gpu.has(wgpu::DownlevelFlags::DEPTH_TEXTURE_AND_BUFFER_COPIES) {
         return Err(format!("copies between {format} textures and buffers"));
     }
-    if back && gpu.is_gl() {
-        // OpenGL ES reads back what it can render to.
-        let renders = gpu.format(format).is_some_and(|(_, features)| {
-            features
-                .allowed_usages
-                .contains(wgpu::TextureUsages::RENDER_ATTACHMENT)
-        });
-        if depth || !renders {
-            return Err(format!("reading back {format} textures"));
-        }
-        let size = desc.extent;
-        if desc.dimension != Dimension::D3
-            && size.width == size.height
-            && size.depth_or_layers % 6 == 0
-        {
-            return Err("reading back what may be a cube".to_owned());
-        }
+    if back {
+        check_copy_source(gpu, desc)?;
+    }
+    Ok(())
+}
+
+/// Whether texels can be copied from a texture; what cannot be done otherwise.
+fn check_copy_source(gpu: &Gpu, desc: &TextureDesc) -> Result<(), String> {
+    if !gpu.is_gl() {
+        return Ok(());
+    }
+    let format = desc.format;
+    let size = desc.extent;
+    if desc.dimension != Dimension::D3 && size.width == size.height && size.depth_or_layers % 6 == 0
+    {
+        return Err("copies from what OpenGL takes for a cube".to_owned());
+    }
+    if format.sample_kind() == SampleKind::Depth || !gpu.copies(format) {
+        return Err(format!("copies from {format} textures"));
     }
     Ok(())
 }
@@ -229,11 +235,14 @@ impl Checker<'_> {
                     let size = convert::copy_extent(desc, range.mip, range);
                     (desc.format, size, range.mips)
                 };
-                if shape(from, source.1) == shape(to, target.1) {
-                    Ok(())
-                } else {
-                    Err(self.malformed("source and target are of different shapes"))
+                if shape(from, source.1) != shape(to, target.1) {
+                    return Err(self.malformed("source and target are of different shapes"));
                 }
+                if self.gpu.is_gl() && from.dimension == Dimension::D3 {
+                    // wgpu copies one slice there.
+                    return Err(self.unsupported("copies between 3D textures"));
+                }
+                check_copy_source(self.gpu, from).map_err(|what| self.unsupported(what))
             }
             Step::CopyBuffer { source, target } => {
                 if self.buffer(*source)? == self.buffer(*target)? && source != target {
@@ -273,6 +282,10 @@ impl Checker<'_> {
             }
             (BindingKind::StorageTexture { format, .. }, Bound::Texture { resource, range }) => {
                 let desc = self.texture(*resource, *range)?;
+                if self.gpu.is_gl() && desc.dimension == Dimension::D3 {
+                    // wgpu binds one slice there.
+                    return Err(self.unsupported(format!("`{name}` as 3D storage texture")));
+                }
                 if desc.format == *format && range.mips == 1 {
                     Ok(())
                 } else {

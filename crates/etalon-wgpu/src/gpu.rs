@@ -1,5 +1,6 @@
 //! A device, what it can do, and calls into it that cannot panic.
 
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -10,6 +11,7 @@ use etalon_core::resource::{Limits, TextureDesc};
 
 use crate::convert;
 use crate::fault::Fault;
+use crate::probe;
 use crate::tally::{Owned, Tally};
 
 /// Why the device was lost, once it is.
@@ -28,6 +30,8 @@ pub(crate) struct Gpu {
     downlevel: wgpu::DownlevelFlags,
     /// In the order of [`Format::ALL`].
     formats: Vec<Option<wgpu::TextureFormatFeatures>>,
+    /// Formats tried out so far, on OpenGL.
+    copied: Mutex<BTreeMap<Format, bool>>,
     lost: Loss,
     /// Errors outside of any scope: a driver's that come late.
     stray: Arc<Mutex<Vec<String>>>,
@@ -80,6 +84,7 @@ impl Gpu {
             limits: device.limits(),
             downlevel,
             formats: Format::ALL.iter().map(support).collect(),
+            copied: Mutex::default(),
             lost: Loss::default(),
             stray: Arc::default(),
             tally: Arc::default(),
@@ -158,6 +163,20 @@ impl Gpu {
             convert::format(format)?,
             *self.formats.get(index)?.as_ref()?,
         ))
+    }
+
+    /// Whether textures of a format that can be copied from really are.
+    pub(crate) fn copies(&self, format: Format) -> bool {
+        if !self.is_gl() {
+            return true;
+        }
+        let known = || self.copied.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(copies) = known().get(&format) {
+            return *copies;
+        }
+        let copies = probe::copies(self, format);
+        known().insert(format, copies);
+        copies
     }
 
     /// What planning must know.

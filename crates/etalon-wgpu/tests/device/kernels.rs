@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::common::{
-    copy_kernel, everywhere, floats, image, library, on_vulkan, plan, run, uints, words,
+    Route, copy_kernel, everywhere, floats, image, library, on_vulkan, plan, run, uints, words,
 };
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError, CapturedData, Inputs};
@@ -86,7 +86,7 @@ fn uniforms_arrive_by_name_whatever_their_padding() {
 
 #[test]
 fn each_mip_is_made_of_the_one_above() {
-    everywhere(|_, backend| {
+    everywhere(|route, backend| {
         let library = library(
             "test/max",
             "@group(0) @binding(0) var source: texture_2d<f32>;
@@ -116,6 +116,13 @@ fn each_mip_is_made_of_the_one_above() {
             .unwrap();
         graph.output("pyramid", pyramid).unwrap();
         let inputs = Inputs::new().texture("base", &base);
+        if route == Route::Gl {
+            // wgpu's stores to mips other than those sampled get lost.
+            let plan = plan(backend, &graph, &library, Capture::Outputs);
+            let error = backend.execute(&plan, &inputs).unwrap_err();
+            assert!(matches!(error, BackendError::Unsupported { .. }), "{error}");
+            return;
+        }
         let execution = run(backend, &graph, &library, &inputs);
         let result = execution.output("pyramid").unwrap();
         assert_eq!(result.mip(0), base.mip(0));
@@ -310,7 +317,7 @@ fn layers_slices_and_faces_are_told_apart() {
         (Dimension::D3, 5, "texture_3d", "texture_storage_3d"),
     ];
     for (dimension, depth_or_layers, texture, storage) in shapes {
-        everywhere(|_, backend| {
+        everywhere(|route, backend| {
             let library = library(
                 "test/deep",
                 &format!(
@@ -352,6 +359,13 @@ fn layers_slices_and_faces_are_told_apart() {
                 .unwrap();
             graph.output("image", target).unwrap();
             let inputs = Inputs::new().texture("source", &image);
+            if route == Route::Gl && dimension == Dimension::D3 {
+                // wgpu would store to the first slice only.
+                let plan = plan(backend, &graph, &library, Capture::Outputs);
+                let error = backend.execute(&plan, &inputs).unwrap_err();
+                assert!(matches!(error, BackendError::Unsupported { .. }), "{error}");
+                return;
+            }
             let execution = run(backend, &graph, &library, &inputs);
             let result = execution.output("image").unwrap();
             assert_eq!(result.desc, desc);
@@ -566,7 +580,7 @@ fn a_failed_frame_leaves_histories_as_they_were() {
 
 #[test]
 fn depth_is_loaded_as_it_was_given() {
-    everywhere(|_, backend| {
+    everywhere(|route, backend| {
         for format in [Format::Depth32Float, Format::Depth16Unorm] {
             let desc = TextureDesc::d2(37, 11, format);
             let image = image(desc);
@@ -582,6 +596,13 @@ fn depth_is_loaded_as_it_was_given() {
                 .unwrap();
             graph.output("loaded", target).unwrap();
             let inputs = Inputs::new().texture("depth", &image);
+            if route == Route::Gl && format == Format::Depth16Unorm {
+                // OpenGL ES does not copy between depth textures and buffers.
+                let plan = plan(backend, &graph, &library, Capture::Outputs);
+                let error = backend.execute(&plan, &inputs).unwrap_err();
+                assert!(error.to_string().contains("depth16unorm"), "{error}");
+                continue;
+            }
             let execution = run(backend, &graph, &library, &inputs);
             let wanted: Vec<f32> = image
                 .texels(0)

@@ -39,7 +39,9 @@ fn attempt(
         Ok(execution) => Some(execution),
         Err(BackendError::Unsupported { step, what }) if route == Route::Gl => {
             assert!(
-                what.contains(format.name()) || what.contains("cube"),
+                [format.name(), "cube", "3D"]
+                    .iter()
+                    .any(|text| what.contains(text)),
                 "{step}: {what}"
             );
             println!("{route:?}: {step}: {what}");

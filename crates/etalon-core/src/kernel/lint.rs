@@ -13,7 +13,7 @@
 //! | `%` on floats | no | `x - y * trunc(x / y)`, or an exact remainder |
 //! | vector × scalar, matrix × scalar, matrix ± matrix | yes | componentwise |
 //! | matrix × vector, vector × matrix, matrix × matrix, `dot`, `cross`, `determinant`, `outerProduct` | no | order of summation, contraction |
-//! | `abs min max clamp saturate sign step floor ceil trunc round`, `select` | yes | exact for finite values, except the sign of a zero from `min` and `max` of zeros of both signs |
+//! | `abs min max clamp saturate sign step floor ceil trunc round`, `select` | yes | exact for finite values and bounds in order; only the sign of a zero from `sign`, or from `min` and `max` of zeros of both signs, is not fixed |
 //! | `fract` | no | may or may not stay below 1 |
 //! | `fma` | no | may or may not be fused |
 //! | `mix smoothstep distance length normalize faceForward reflect refract radians degrees` | no | sums and products a driver orders itself |

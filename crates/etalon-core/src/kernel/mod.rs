@@ -11,7 +11,7 @@
 //! ```
 //!
 //! Every executor is given the same [`Kernel::module`], so a kernel means the
-//! same everywhere. [`spirv`](spirv()) (feature `spirv`) translates it for
+//! same everywhere. `spirv()` (feature `spirv`) translates it for
 //! Vulkan.
 //!
 //! # What a kernel may use

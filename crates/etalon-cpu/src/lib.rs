@@ -14,6 +14,7 @@
 
 #![deny(unsafe_code)]
 
+mod backend;
 mod binding;
 mod code;
 mod error;
@@ -26,8 +27,9 @@ mod program;
 mod registers;
 mod translate;
 
+pub use backend::{CpuBackend, CpuOptions};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
 pub use exec::{DispatchCounters, Executor, Tier};
-pub use memory::{Buffer, Texture};
+pub use memory::{Buffer, Texture, TextureView};
 pub use program::{BoundResource, Program};

@@ -1,8 +1,9 @@
 //! Programs: kernels made ready to run.
 
 use std::fmt;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
+use etalon_core::kernel::Kernel;
 use etalon_core::resource::{Dimension, SamplerDesc};
 use naga::valid::ModuleInfo;
 use naga::{Module, ShaderStage, Span};
@@ -11,7 +12,7 @@ use crate::binding::{BindingInfo, BindingKind, ChannelKind, View};
 use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
 use crate::exec::{DispatchCounters, Executor, Linked, Resource, Tier};
-use crate::memory::{Buffer, Texture};
+use crate::memory::{Buffer, TextureView};
 use crate::translate::{self, Fail};
 use crate::{exec, lower};
 
@@ -29,12 +30,12 @@ pub struct Program {
 }
 
 /// What a binding is given.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub enum BoundResource<'a> {
     /// For uniform blocks and storage buffers.
     Buffer(&'a Buffer),
     /// For textures and storage textures.
-    Texture(&'a Texture),
+    Texture(TextureView<'a>),
     /// For samplers.
     Sampler(SamplerDesc),
 }
@@ -58,6 +59,19 @@ impl Program {
     /// [`TranslateError`] if the kernel uses what the interpreter does not have.
     pub fn from_module(name: &str, source: &str, module: &Module, info: &ModuleInfo, entry_point: &str) -> Result<Self, TranslateError> {
         Self::new(name.to_owned(), Box::new(locate_in(name.to_owned(), source.to_owned())), module, info, entry_point)
+    }
+
+    /// Translates a kernel.
+    ///
+    /// # Errors
+    /// [`TranslateError`] if the kernel uses what the interpreter does not have.
+    pub fn translate(kernel: &Arc<Kernel>) -> Result<Self, TranslateError> {
+        let source = Arc::clone(kernel);
+        let locate = move |span| {
+            let place = source.source_map.locate(span);
+            Location { file: place.file, line: place.line, column: place.column }
+        };
+        Self::new(kernel.name.clone(), Box::new(locate), &kernel.module, &kernel.info, &kernel.entry_point)
     }
 
     fn new(name: String, locate: Box<dyn Fn(Span) -> Location + Send + Sync>, module: &Module, info: &ModuleInfo, entry_point: &str) -> Result<Self, TranslateError> {
@@ -135,16 +149,16 @@ impl Program {
         }
     }
 
-    fn check<'a>(&self, binding: &BindingInfo, resource: Option<&BoundResource<'a>>) -> Result<Resource<'a>, RunError> {
+    fn check<'a>(&self, binding: &BindingInfo, resource: Option<&'a BoundResource<'a>>) -> Result<Resource<'a>, RunError> {
         let mismatch = |expected: String, found: String| RunError::Binding { kernel: self.name.clone(), binding: binding.name.clone(), expected, found };
         match (binding.kind, resource) {
-            (BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. }, Some(&BoundResource::Buffer(buffer))) => {
+            (BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. }, Some(BoundResource::Buffer(buffer))) => {
                 if buffer.len() < need.into() {
                     return Err(mismatch(format!("a buffer of at least {need} bytes"), format!("one of {} bytes", buffer.len())));
                 }
                 Ok(Resource::Buffer(buffer.words(), buffer.len()))
             }
-            (BindingKind::Texture { view, kind }, Some(&BoundResource::Texture(texture))) => {
+            (BindingKind::Texture { view, kind }, Some(BoundResource::Texture(texture))) => {
                 let desc = texture.desc();
                 let found = match desc.format.sample_kind() {
                     etalon_core::format::SampleKind::Sint => ChannelKind::Sint,
@@ -156,14 +170,14 @@ impl Program {
                 }
                 Ok(Resource::Texture(texture))
             }
-            (BindingKind::StorageTexture { view, format, .. }, Some(&BoundResource::Texture(texture))) => {
+            (BindingKind::StorageTexture { view, format, .. }, Some(BoundResource::Texture(texture))) => {
                 let desc = texture.desc();
                 if !fits(view, desc.dimension) || desc.format != format {
                     return Err(mismatch(format!("a {view:?} texture of format {format}"), format!("a {:?} texture of format {}", desc.dimension, desc.format)));
                 }
                 Ok(Resource::Texture(texture))
             }
-            (BindingKind::Sampler, Some(&BoundResource::Sampler(sampler))) => Ok(Resource::Sampler(sampler)),
+            (BindingKind::Sampler, Some(BoundResource::Sampler(sampler))) => Ok(Resource::Sampler(*sampler)),
             (kind, found) => {
                 let expected = match kind {
                     BindingKind::Uniform { .. } | BindingKind::Storage { .. } => "a buffer",
@@ -188,7 +202,7 @@ const MAX_INVOCATIONS: u32 = 1024;
 fn fits(view: View, dimension: Dimension) -> bool {
     match view {
         // The faces of a cube can be read and written as layers.
-        View::D2 | View::D2Array => matches!(dimension, Dimension::D2 | Dimension::Cube),
+        View::D2 | View::D2Array => dimension != Dimension::D3,
         View::D3 => dimension == Dimension::D3,
         View::Cube | View::CubeArray => dimension == Dimension::Cube,
     }

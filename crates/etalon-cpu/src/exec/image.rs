@@ -8,7 +8,7 @@ use super::state::{Resource, State};
 use super::tier::{Handler, Step, Tier};
 use crate::code::{CodeInst, Slot};
 use crate::ir::{ImageAccess, ImageQuery, Op};
-use crate::memory::{Level, Texels, Texture, decode, encode};
+use crate::memory::{Level, Texels, TextureView, decode, encode};
 use crate::num::{Number, mask};
 use crate::registers::LANES;
 
@@ -20,7 +20,7 @@ pub(super) fn query<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     if varying { Handler::new::<Query<LANES>>(tier) } else { Handler::plain::<Query<1>>() }
 }
 
-pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a Texture> {
+pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a TextureView<'a>> {
     match state.resources.get(usize::from(image)) {
         Some(&Resource::Texture(texture)) => Some(texture),
         _ => None,
@@ -54,7 +54,7 @@ fn locate<const K: usize>(level: Level, x: &[u32; K], y: &[u32; K], z: Option<&[
 
 /// The indices of the texels that an instruction's operands name.
 #[inline(always)]
-fn addresses<N: Number, const K: usize>(state: &State<'_, N>, texture: &Texture, access: ImageAccess, operands: &[Slot], level: Option<Slot>, chunk: usize) -> [u32; K] {
+fn addresses<N: Number, const K: usize>(state: &State<'_, N>, texture: &TextureView<'_>, access: ImageAccess, operands: &[Slot], level: Option<Slot>, chunk: usize) -> [u32; K] {
     let (x, y) = (state.ints(operands[0], chunk), state.ints(operands[1], chunk));
     let z: Option<[u32; K]> = (access.coordinates == 3 || access.layered).then(|| state.ints(operands[2], chunk));
     let mut out = [OUTSIDE; K];
@@ -136,7 +136,7 @@ impl<N: Number, const K: usize> Step<N> for Load<K> {
         for chunk in 0..rounds::<N, K>(state) {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
             let mut words = [[0; K]; 2];
-            gather(&texture.texels, &index, &mut words);
+            gather(texture.texels, &index, &mut words);
             let mut channels = [[0; K]; 4];
             decode(format, &words, wanted, &mut channels);
             // Channels that the format has not are 0, 0, 1 inside only.
@@ -174,7 +174,7 @@ impl<N: Number> Step<N> for Store {
             let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
             let mut words = [[0; LANES]; 2];
             encode(texture.desc().format, &channels, &mut words);
-            scatter(&texture.texels, &index, &words);
+            scatter(texture.texels, &index, &words);
         }
     }
 }

@@ -12,7 +12,7 @@ use super::memory::rounds;
 use super::state::{Resource, State};
 use super::tier::{Handler, Step, Tier};
 use crate::ir::Op;
-use crate::memory::{Level, Texture, decode};
+use crate::memory::{Level, TextureView, decode};
 use crate::num::Number;
 use crate::registers::LANES;
 
@@ -47,7 +47,7 @@ impl<N: Number, const K: usize> Step<N> for Sample<K> {
 }
 
 struct Request<'a, const K: usize> {
-    texture: &'a Texture,
+    texture: &'a TextureView<'a>,
     sampler: SamplerDesc,
     wanted: [bool; 4],
     /// As given, not yet clamped.
@@ -141,7 +141,7 @@ impl<const K: usize> Request<'_, K> {
             }
         }
         let mut words = [[0; K]; 2];
-        gather(&self.texture.texels, &index, &mut words);
+        gather(self.texture.texels, &index, &mut words);
         let mut channels = [[0; K]; 4];
         decode(self.texture.desc().format, &words, self.wanted, &mut channels);
         for (channel, sum) in sum.iter_mut().enumerate() {

@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicU32;
 use etalon_core::resource::SamplerDesc;
 
 use crate::code::{Code, CodeInst, Slot};
-use crate::memory::Texture;
+use crate::memory::TextureView;
 use crate::num::Number;
 use crate::registers::{Class, LANES, Lanes, Registers};
 
@@ -14,7 +14,7 @@ use crate::registers::{Class, LANES, Lanes, Registers};
 pub(crate) enum Resource<'a> {
     /// A buffer: its words, and its size in bytes.
     Buffer(&'a [AtomicU32], u64),
-    Texture(&'a Texture),
+    Texture(&'a TextureView<'a>),
     Sampler(SamplerDesc),
 }
 

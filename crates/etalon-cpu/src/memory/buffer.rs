@@ -57,10 +57,23 @@ impl Buffer {
     }
 
     /// Sets every byte to zero.
-    pub fn clear(&mut self) {
-        for word in &mut self.words {
-            *word.get_mut() = 0;
+    pub fn clear(&self) {
+        for word in &self.words {
+            word.store(0, Ordering::Relaxed);
         }
+    }
+
+    /// Copies as many bytes of another buffer as both have.
+    pub fn copy_from(&self, source: &Self) {
+        for (word, from) in self.words.iter().zip(&source.words) {
+            word.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+    }
+
+    /// The word at a byte offset that is a multiple of 4.
+    pub(crate) fn word(&self, offset: u64) -> Option<u32> {
+        let word = self.words.get(usize::try_from(offset / 4).ok()?)?;
+        Some(word.load(Ordering::Relaxed))
     }
 
     /// A copy of the bytes.

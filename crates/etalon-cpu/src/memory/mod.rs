@@ -8,7 +8,7 @@ mod texel;
 mod texture;
 
 pub use buffer::Buffer;
-pub use texture::Texture;
+pub use texture::{Texture, TextureView};
 
 pub(crate) use texel::{decode, encode};
 pub(crate) use texture::{Level, Texels};

@@ -2,8 +2,10 @@
 
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
+use etalon_core::graph::Subresources;
 use etalon_core::image::ImageData;
-use etalon_core::resource::TextureDesc;
+use etalon_core::resource::{Dimension, Extent, TextureDesc};
+use etalon_core::texel::Texel;
 
 use crate::error::RunError;
 
@@ -110,42 +112,35 @@ impl Texture {
         self.desc.bytes().unwrap_or(u64::MAX)
     }
 
-    /// Sees the memory as another texture of as many bytes of the same texel size.
-    /// Returns whether it could.
-    pub(crate) fn reinterpret(&mut self, desc: TextureDesc) -> bool {
-        if desc == self.desc {
-            return true;
-        }
-        if desc.bytes() != self.desc.bytes() || desc.format.texel_bytes() != self.desc.format.texel_bytes() {
-            return false;
-        }
-        self.levels.clear();
-        let mut start = 0_u32;
-        for mip in 0..desc.mips {
-            let extent = desc.mip_extent(mip);
-            self.levels.push(Level { width: extent.width, height: extent.height, depth: extent.depth_or_layers, start });
-            start = start.wrapping_add(extent.width.wrapping_mul(extent.height).wrapping_mul(extent.depth_or_layers));
-        }
-        self.desc = desc;
-        true
+    /// All mips and layers.
+    #[must_use]
+    pub fn view(&self) -> TextureView<'_> {
+        TextureView { desc: self.desc, levels: self.levels.clone(), texels: &self.texels }
+    }
+
+    /// Some mips and layers as a texture of their own; `None` if there are no
+    /// such ones.
+    #[must_use]
+    pub fn part(&self, range: Subresources) -> Option<TextureView<'_>> {
+        let desc = part_desc(&self.desc, range)?;
+        let levels = self.levels[range.mip as usize..][..range.mips as usize].iter();
+        let levels = levels
+            .map(|level| match self.desc.dimension {
+                Dimension::D3 => *level,
+                Dimension::D2 | Dimension::Cube => {
+                    Level { depth: range.layers, start: level.start + range.layer * level.width * level.height, ..*level }
+                }
+            })
+            .collect();
+        Some(TextureView { desc, levels, texels: &self.texels })
     }
 
     /// Overwrites the texels; bytes beyond the end are ignored.
     pub fn write(&mut self, bytes: &[u8]) {
         each!(&mut self.texels, words => {
-            let size = words.first_mut().map_or(1, |word| size_of_val(word.get_mut()));
-            for (word, chunk) in words.iter_mut().zip(bytes.chunks_exact(size)) {
-                let mut value = word.get_mut().to_le_bytes();
-                value.copy_from_slice(chunk);
-                *word.get_mut() = from_bytes(value);
+            for (word, chunk) in words.iter_mut().zip(chunks(bytes)) {
+                *word.get_mut() = from_bytes(*chunk);
             }
-        });
-    }
-
-    /// Sets every byte to zero.
-    pub fn clear(&mut self) {
-        each!(&mut self.texels, words => for word in words {
-            *word.get_mut() = 0;
         });
     }
 
@@ -154,15 +149,102 @@ impl Texture {
     /// # Errors
     /// [`RunError::OutOfMemory`] if there is no memory for it.
     pub fn to_image(&self) -> Result<ImageData, RunError> {
-        let total = self.bytes();
+        self.view().to_image()
+    }
+}
+
+/// The shape that a part of a texture has as a texture of its own: some of a
+/// cube's faces are layers.
+fn part_desc(desc: &TextureDesc, range: Subresources) -> Option<TextureDesc> {
+    let within = |first: u32, count: u32, all: u32| count > 0 && first.checked_add(count).is_some_and(|end| end <= all);
+    if !within(range.mip, range.mips, desc.mips) || !within(range.layer, range.layers, desc.layers()) {
+        return None;
+    }
+    let size = desc.mip_extent(range.mip);
+    let (dimension, depth_or_layers) = match desc.dimension {
+        Dimension::D3 => (Dimension::D3, size.depth_or_layers),
+        Dimension::Cube if range.layers % 6 == 0 => (Dimension::Cube, range.layers),
+        Dimension::D2 | Dimension::Cube => (Dimension::D2, range.layers),
+    };
+    Some(TextureDesc { dimension, extent: Extent { depth_or_layers, ..size }, mips: range.mips, format: desc.format })
+}
+
+/// Some mips and layers of a texture.
+#[derive(Clone, Debug)]
+pub struct TextureView<'a> {
+    desc: TextureDesc,
+    pub(crate) levels: Vec<Level>,
+    pub(crate) texels: &'a Texels,
+}
+
+impl TextureView<'_> {
+    /// Shape and format of the part.
+    #[must_use]
+    pub fn desc(&self) -> TextureDesc {
+        self.desc
+    }
+
+    /// The words of each mip, which are consecutive: first and one past the last.
+    fn runs(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        let words = if matches!(self.texels, Texels::B16(_)) { 2 } else { 1 };
+        self.levels.iter().map(move |level| {
+            let start = level.start as usize * words;
+            start..start + level.width as usize * level.height as usize * level.depth as usize * words
+        })
+    }
+
+    /// A copy of the texels.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn to_image(&self) -> Result<ImageData, RunError> {
+        let total = self.desc.bytes().unwrap_or(u64::MAX);
         let mut bytes = Vec::new();
         let capacity = usize::try_from(total).unwrap_or(usize::MAX);
         bytes.try_reserve_exact(capacity).map_err(|_| RunError::OutOfMemory { what: "a copy of a texture".to_owned(), bytes: total })?;
-        each!(&self.texels, words => for word in words {
-            bytes.extend_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
-        });
+        for run in self.runs() {
+            each!(self.texels, words => for word in &words[run] {
+                bytes.extend_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
+            });
+        }
         Ok(ImageData { desc: self.desc, bytes })
     }
+
+    /// Fills all texels with one.
+    pub fn fill(&self, texel: Texel) {
+        let mut bytes = [0; 16];
+        self.desc.format.encode(texel, &mut bytes);
+        for run in self.runs() {
+            each!(self.texels, words => for (word, chunk) in words[run].iter().zip(chunks(&bytes[..self.desc.format.texel_bytes() as usize]).cycle()) {
+                word.store(from_bytes(*chunk), Ordering::Relaxed);
+            });
+        }
+    }
+
+    /// Copies all texels of a part of equal shape; says whether it is one.
+    pub fn copy_from(&self, source: &TextureView<'_>) -> bool {
+        let shape = |desc: &TextureDesc| (desc.extent, desc.mips, desc.format);
+        if shape(&self.desc) != shape(&source.desc) {
+            return false;
+        }
+        for (to, from) in self.runs().zip(source.runs()) {
+            match (self.texels, source.texels) {
+                (Texels::B1(a), Texels::B1(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B2(a), Texels::B2(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B4(a), Texels::B4(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B8(a) | Texels::B16(a), Texels::B8(b) | Texels::B16(b)) => {
+                    a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed));
+                }
+                // One format has one texel size.
+                _ => return false,
+            }
+        }
+        true
+    }
+}
+
+fn chunks<const SIZE: usize>(bytes: &[u8]) -> std::slice::Iter<'_, [u8; SIZE]> {
+    bytes.as_chunks().0.iter()
 }
 
 /// `T::from_le_bytes` for the word types.

@@ -1,0 +1,131 @@
+//! Running plans.
+
+mod histories;
+mod pool;
+mod resources;
+mod run;
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use etalon_core::backend::{Backend, BackendError, BackendInfo, Counters, Execution, Inputs};
+use etalon_core::kernel::{Kernel, KernelId};
+use etalon_core::plan::Plan;
+use etalon_core::resource::Limits;
+
+use self::histories::Histories;
+use self::pool::Pool;
+use crate::error::RunError;
+use crate::exec::{Executor, Tier};
+use crate::program::Program;
+
+/// How plans are run on the CPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CpuOptions {
+    /// Number of threads; 0 for one per processor. Results do not depend on it.
+    pub threads: usize,
+    /// Instruction set; the best one there is without it. Results do not depend
+    /// on it.
+    pub tier: Option<Tier>,
+    /// See [`Executor::with_lanes`].
+    pub lanes: u32,
+    /// See [`Executor::with_max_trips`].
+    pub max_trips: u32,
+}
+
+impl Default for CpuOptions {
+    fn default() -> Self {
+        Self { threads: 0, tier: None, lanes: 64, max_trips: Executor::DEFAULT_MAX_TRIPS }
+    }
+}
+
+/// The interpreter as a backend.
+#[derive(Debug)]
+pub struct CpuBackend {
+    executor: Executor,
+    programs: HashMap<KernelId, Program>,
+    pool: Pool,
+    histories: Histories,
+    counters: Counters,
+}
+
+impl CpuBackend {
+    /// Starts the threads.
+    ///
+    /// # Errors
+    /// [`BackendError::NoDevice`] if the system gives no threads.
+    pub fn new(options: &CpuOptions) -> Result<Self, BackendError> {
+        let executor = Executor::new(options.threads).map_err(|error| BackendError::NoDevice { backend: "cpu", reason: error.to_string() })?;
+        let executor = executor.with_lanes(options.lanes).with_max_trips(options.max_trips).with_tier(options.tier.unwrap_or_else(Tier::best));
+        Ok(Self { executor, programs: HashMap::new(), pool: Pool::default(), histories: Histories::default(), counters: Counters::default() })
+    }
+
+    /// What runs the programs.
+    #[must_use]
+    pub fn executor(&self) -> &Executor {
+        &self.executor
+    }
+
+    /// The bytecode of a kernel, for reading; translated at most once.
+    ///
+    /// # Errors
+    /// [`BackendError::Kernel`] if the kernel uses what the interpreter does not have.
+    pub fn program(&mut self, kernel: &Arc<Kernel>) -> Result<&Program, BackendError> {
+        self.prepare(&kernel.name, kernel)?;
+        self.programs.get(&kernel.id).ok_or_else(|| BackendError::Api { call: "translate", reason: format!("kernel {} was not kept", kernel.name) })
+    }
+
+    /// Translates a kernel unless that was done before.
+    fn prepare(&mut self, step: &str, kernel: &Arc<Kernel>) -> Result<(), BackendError> {
+        if let std::collections::hash_map::Entry::Vacant(entry) = self.programs.entry(kernel.id) {
+            let program = Program::translate(kernel).map_err(|error| BackendError::Kernel { step: step.to_owned(), error: Box::new(error) })?;
+            entry.insert(program);
+            self.counters.kernels += 1;
+            self.counters.pipelines += 1;
+        }
+        Ok(())
+    }
+}
+
+/// A [`RunError`] of a step.
+fn step_error(step: &str, error: RunError) -> BackendError {
+    match error {
+        RunError::OutOfMemory { what, bytes } => BackendError::OutOfMemory { what, bytes },
+        other => BackendError::Kernel { step: step.to_owned(), error: Box::new(other) },
+    }
+}
+
+/// A plan that contradicts itself.
+fn malformed(step: &str, what: impl std::fmt::Display) -> BackendError {
+    BackendError::Api { call: "plan", reason: format!("step `{step}`: {what}") }
+}
+
+impl Backend for CpuBackend {
+    fn info(&self) -> BackendInfo {
+        BackendInfo {
+            backend: "cpu",
+            api: self.executor.tier().to_string(),
+            device: format!("{} threads of {}", self.executor.threads(), std::env::consts::ARCH),
+            driver: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
+        }
+    }
+
+    fn limits(&self) -> Limits {
+        // Beyond what WebGPU guarantees, only memory limits the interpreter;
+        // these are what large devices have.
+        Limits { max_texture_2d: 16_384, max_texture_layers: 2048, max_workgroup_invocations: 1024, max_workgroup_bytes: 1 << 16, uniform_alignment: 16, ..Limits::default() }
+    }
+
+    fn execute(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
+        self.run(plan, inputs)
+    }
+
+    fn reset_histories(&mut self) {
+        self.histories.reset(&mut self.pool);
+    }
+
+    fn counters(&self) -> Counters {
+        let made = self.pool.counters();
+        Counters { textures: made.textures, buffers: made.buffers, allocations: made.textures + made.buffers, bytes: made.bytes, ..self.counters }
+    }
+}

@@ -1,0 +1,130 @@
+//! One run of a plan.
+
+use std::time::Instant;
+
+use etalon_core::backend::{BackendError, Captured, CapturedData, Execution, Inputs, StepTime};
+use etalon_core::graph::ResourceDesc;
+use etalon_core::kernel::Kernel;
+use etalon_core::plan::{Bound, Groups, Plan, Step};
+
+use super::histories::clear_texel;
+use super::resources::Resources;
+use super::{CpuBackend, malformed, step_error};
+use crate::error::RunError;
+use crate::memory::Buffer;
+use crate::program::BoundResource;
+
+impl CpuBackend {
+    pub(super) fn run(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
+        for step in &plan.steps {
+            if let Step::Dispatch { kernel, .. } = &step.step {
+                self.prepare(&step.name, &kernel.0)?;
+            }
+        }
+        let mut resources = Resources::default();
+        let result = self.run_with(plan, inputs, &mut resources);
+        resources.release(&mut self.pool);
+        self.pool.end_frame();
+        if result.is_ok() {
+            self.histories.advance(plan, &mut self.pool);
+        }
+        result
+    }
+
+    fn run_with(&mut self, plan: &Plan, inputs: &Inputs<'_>, resources: &mut Resources) -> Result<Execution, BackendError> {
+        resources.acquire(plan, inputs, &mut self.pool)?;
+        self.histories.acquire(plan, &mut self.pool).map_err(|error| step_error("histories", error))?;
+        let mut execution = Execution::default();
+        for step in &plan.steps {
+            let start = Instant::now();
+            self.counters.barriers += step.barriers.len() as u64;
+            let captured = self.step(plan, &step.name, &step.step, resources)?;
+            match captured {
+                Some(captured) => execution.captures.push(captured),
+                None => {
+                    let nanoseconds = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+                    execution.times.push(StepTime { step: step.name.clone(), nanoseconds });
+                }
+            }
+        }
+        self.counters.barriers += plan.final_barriers.len() as u64;
+        Ok(execution)
+    }
+
+    fn step(&mut self, plan: &Plan, name: &str, step: &Step, resources: &Resources) -> Result<Option<Captured>, BackendError> {
+        match step {
+            Step::Dispatch { kernel, bindings, groups } => self.dispatch(plan, name, &kernel.0, bindings, groups, resources)?,
+            Step::ClearTexture { resource, range, value } => resources.texture(name, plan, &self.histories, *resource, *range)?.fill(clear_texel(*value)),
+            Step::ClearBuffer { resource } => resources.buffer(name, *resource)?.clear(),
+            Step::CopyTexture { source, target } => {
+                let from = resources.texture(name, plan, &self.histories, source.0, source.1)?;
+                let to = resources.texture(name, plan, &self.histories, target.0, target.1)?;
+                if !to.copy_from(&from) {
+                    return Err(malformed(name, "source and target are of different shapes"));
+                }
+            }
+            Step::CopyBuffer { source, target } => resources.buffer(name, *target)?.copy_from(resources.buffer(name, *source)?),
+            Step::Capture { resource, range, pass, binding } => {
+                let Some(planned) = plan.resources.get(*resource as usize) else {
+                    return Err(malformed(name, format_args!("there is no resource {resource}")));
+                };
+                let data = match planned.desc {
+                    ResourceDesc::Texture(_) => {
+                        let view = resources.texture(name, plan, &self.histories, *resource, *range)?;
+                        CapturedData::Texture(view.to_image().map_err(|error| step_error(name, error))?)
+                    }
+                    ResourceDesc::Buffer(_) => CapturedData::Buffer(resources.buffer(name, *resource)?.to_bytes().map_err(|error| step_error(name, error))?),
+                };
+                return Ok(Some(Captured { pass: pass.clone(), binding: binding.clone(), resource: planned.name.clone(), data }));
+            }
+        }
+        Ok(None)
+    }
+
+    fn dispatch(&mut self, plan: &Plan, name: &str, kernel: &Kernel, bindings: &[Bound], groups: &Groups, resources: &Resources) -> Result<(), BackendError> {
+        let program = self.programs.get(&kernel.id).ok_or_else(|| malformed(name, "its kernel was not translated"))?;
+        let groups = match groups {
+            Groups::Direct(groups) => *groups,
+            Groups::Indirect { buffer, offset } => {
+                let buffer = resources.buffer(name, *buffer)?;
+                let word = |axis: u64| offset.checked_add(4 * axis).filter(|at| at % 4 == 0).and_then(|at| buffer.word(at));
+                match (word(0), word(1), word(2)) {
+                    (Some(x), Some(y), Some(z)) => [x, y, z],
+                    _ => return Err(malformed(name, "its arguments are outside of their buffer")),
+                }
+            }
+        };
+        // Uniform blocks are small: each dispatch has copies of its own.
+        let mut uniforms = Vec::new();
+        for bound in bindings {
+            if let Bound::Uniform(slice) = bound {
+                let range = slice.offset as usize..(slice.offset as usize).saturating_add(slice.size as usize);
+                let bytes = plan.uniforms.get(range).ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?;
+                uniforms.push(Buffer::from_bytes(bytes).map_err(|error| step_error(name, error))?);
+            }
+        }
+        let mut next_uniform = uniforms.iter();
+        let mut given = Vec::with_capacity(bindings.len());
+        for bound in bindings {
+            given.push(match *bound {
+                Bound::Texture { resource, range } => BoundResource::Texture(resources.texture(name, plan, &self.histories, resource, range)?),
+                Bound::Buffer { resource } => BoundResource::Buffer(resources.buffer(name, resource)?),
+                Bound::Uniform(_) => BoundResource::Buffer(next_uniform.next().ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?),
+                Bound::Sampler(sampler) => BoundResource::Sampler(sampler),
+            });
+        }
+        // The kernel lists bindings by number, the program by declaration.
+        let mut bound = Vec::with_capacity(given.len());
+        for wanted in program.bindings() {
+            let position = kernel.bindings.iter().position(|binding| (binding.group, binding.binding) == (wanted.group, wanted.binding));
+            let found = position.and_then(|position| given.get(position)).ok_or_else(|| {
+                let error = RunError::Binding { kernel: kernel.name.clone(), binding: wanted.name.clone(), expected: "a resource".to_owned(), found: "nothing".to_owned() };
+                step_error(name, error)
+            })?;
+            bound.push(found.clone());
+        }
+        self.counters.dispatches += 1;
+        program.dispatch(&self.executor, groups, &bound).map_err(|error| step_error(name, error))?;
+        Ok(())
+    }
+}

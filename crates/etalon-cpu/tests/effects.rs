@@ -58,7 +58,7 @@ fn blur_is_exact() {
     let params = buffer(&[radius as u32, sigma.to_bits()]);
     for (name, executor) in executors() {
         let target = empty(width, height, Format::Rgba32Float);
-        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(&source), BoundResource::Texture(&target)];
+        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(source.view()), BoundResource::Texture(target.view())];
         program.dispatch(&executor, [width.div_ceil(8), height.div_ceil(8), 1], &bound).unwrap();
         assert!(target.to_image().unwrap().bytes == expected, "{name}");
     }
@@ -173,7 +173,7 @@ fn march_is_exact() {
     let params = buffer(&[steps, thickness.to_bits(), stride.to_bits()]);
     for (name, executor) in executors() {
         let target = empty(width, height, Format::Rgba32Float);
-        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(&depth), BoundResource::Texture(&target)];
+        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(depth.view()), BoundResource::Texture(target.view())];
         program.dispatch(&executor, [width.div_ceil(8), height.div_ceil(8), 1], &bound).unwrap();
         let got = target.to_image().unwrap().bytes;
         for (i, (a, b)) in got.chunks(16).zip(expected.chunks(16)).enumerate() {

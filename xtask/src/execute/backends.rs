@@ -16,6 +16,7 @@ pub fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
     Ok(match job.backend {
         BackendKind::Cpu => Box::new(CpuBackend::new(&CpuOptions {
             threads: job.threads,
+            ..CpuOptions::default()
         })?),
         BackendKind::Wgpu => {
             let backends = match job.api {

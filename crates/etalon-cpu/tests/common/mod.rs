@@ -7,7 +7,7 @@ use etalon_core::resource::TextureDesc;
 use etalon_cpu::{BoundResource, Buffer, Executor, Program, Texture, Tier, TranslateError};
 
 /// Parses, validates and translates; the entry point is `main`.
-pub fn translate(wgsl: &str) -> Result<Program, TranslateError> {
+pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
     let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
     let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
         .validate(&module)
@@ -15,12 +15,12 @@ pub fn translate(wgsl: &str) -> Result<Program, TranslateError> {
     Program::from_module("test", wgsl, &module, &info, "main")
 }
 
-pub fn program(wgsl: &str) -> Program {
+pub(crate) fn program(wgsl: &str) -> Program {
     translate(wgsl).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Every way of running that must give the same bits.
-pub fn executors() -> Vec<(String, Executor)> {
+pub(crate) fn executors() -> Vec<(String, Executor)> {
     let mut all = Vec::new();
     for tier in Tier::ALL.into_iter().filter(|tier| tier.is_available()) {
         for (threads, lanes) in [(1, 64), (3, 64), (2, 256)] {
@@ -31,22 +31,22 @@ pub fn executors() -> Vec<(String, Executor)> {
     all
 }
 
-pub fn words(buffer: &Buffer) -> Vec<u32> {
+pub(crate) fn words(buffer: &Buffer) -> Vec<u32> {
     buffer.to_bytes().unwrap().chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
 }
 
-pub fn buffer(words: &[u32]) -> Buffer {
+pub(crate) fn buffer(words: &[u32]) -> Buffer {
     let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
     Buffer::from_bytes(&bytes).unwrap()
 }
 
-pub fn floats(values: &[f32]) -> Buffer {
+pub(crate) fn floats(values: &[f32]) -> Buffer {
     buffer(&values.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
 }
 
 /// Runs a kernel with storage buffers `data` (binding 0) and `result`
 /// (binding 1), in every way, and returns the words of `result`.
-pub fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: u32) -> Vec<u32> {
+pub(crate) fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: u32) -> Vec<u32> {
     let program = program(wgsl);
     let input = buffer(data);
     let mut first: Option<Vec<u32>> = None;
@@ -74,15 +74,15 @@ pub fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: u32) ->
 }
 
 /// An image whose texels are `f(x, y)`.
-pub fn image(width: u32, height: u32, format: Format, f: impl Fn(u32, u32) -> [f32; 4]) -> ImageData {
+pub(crate) fn image(width: u32, height: u32, format: Format, f: impl Fn(u32, u32) -> [f32; 4]) -> ImageData {
     let texels: Vec<[f32; 4]> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| f(x, y)).collect();
     ImageData::from_rgba_f32(TextureDesc::d2(width, height, format), &texels).unwrap()
 }
 
-pub fn texture(image: &ImageData) -> Texture {
+pub(crate) fn texture(image: &ImageData) -> Texture {
     Texture::from_image(image).unwrap()
 }
 
-pub fn empty(width: u32, height: u32, format: Format) -> Texture {
+pub(crate) fn empty(width: u32, height: u32, format: Format) -> Texture {
     Texture::zeroed(TextureDesc::d2(width, height, format)).unwrap()
 }

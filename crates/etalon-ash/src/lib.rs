@@ -39,6 +39,7 @@
 
 mod backend;
 mod buffer;
+mod chains;
 mod check;
 mod commands;
 mod convert;

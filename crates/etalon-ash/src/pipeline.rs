@@ -180,6 +180,7 @@ impl Pipeline {
             step: step.name.clone(),
             error: Box::new(error),
         })?;
+        let words = crate::chains::flatten(&words);
         count(&device.tally.kernels, 1);
         let entries: Vec<_> = kernel
             .bindings

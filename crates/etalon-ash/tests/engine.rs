@@ -114,7 +114,7 @@ fn images_of_the_engine_go_in_and_out() {
             )
         };
         let (seen, kept) = (engine.buffer(bytes(DESC)), engine.buffer(bytes(DESC)));
-        for (frame, total) in [(1, 3.5), (2, 8.0)] {
+        for (frame, total) in [(1, 3.5), (2, 8.5)] {
             let plan = common::plan(&backend, &accumulate(0.5 * frame as f32), Capture::None);
             let commands = engine.begin();
             engine.fill(commands, &input, 2.0 + frame as f32);

@@ -10,7 +10,7 @@ use etalon_core::graph::{ClearValue, Graph};
 use etalon_core::plan::{Capture, Plan};
 use etalon_core::resource::{BufferDesc, TextureDesc};
 
-/// Two kernels that write the same buffer, one after the other.
+/// A kernel that reads a buffer which another has written.
 fn buffers() -> Graph {
     let mut graph = Graph::new();
     let values = graph.buffer("values", BufferDesc { bytes: 4096 });
@@ -34,19 +34,31 @@ fn buffers() -> Graph {
     graph
 }
 
-/// A kernel that updates a texture twice, in one layout.
+/// A kernel that reads a texture which another has written, in one layout.
+///
+/// (Two writes in a row would not do: the layer holds its tongue about writes
+/// after writes through descriptors.)
 fn textures() -> Graph {
+    let desc = TextureDesc::d2(16, 16, Format::R32Float);
     let mut graph = Graph::new();
-    let image = graph.texture("image", TextureDesc::d2(16, 16, Format::R32Float));
-    let mut image = graph.clear(image, ClearValue::Float([0.0; 4])).unwrap();
-    for _ in 0..2 {
-        image = graph
-            .compute("test/increment")
-            .update("image", image)
-            .per_texel("image")
-            .unwrap();
-    }
-    graph.output("image", image).unwrap();
+    let cleared = graph.texture("cleared", desc);
+    let cleared = graph.clear(cleared, ClearValue::Float([0.0; 4])).unwrap();
+    let image = graph.texture("image", desc);
+    let image = graph
+        .compute("test/add")
+        .read("source", cleared)
+        .write("result", image)
+        .set("offset", 1.0_f32)
+        .per_texel("result")
+        .unwrap();
+    let copy = graph.texture("copy", desc);
+    let copy = graph
+        .compute("test/copy_stored")
+        .read("source", image)
+        .write("result", copy)
+        .per_texel("result")
+        .unwrap();
+    graph.output("copy", copy).unwrap();
     graph
 }
 
@@ -94,9 +106,9 @@ fn without_barriers(plan: &Plan, step: &str, resource: &str) -> Plan {
 #[test]
 fn a_missing_barrier_is_an_error() {
     for device in common::devices() {
-        for (graph, step, resource, hazard) in [
-            (buffers(), "test/copy_values", "values", "READ_AFTER_WRITE"),
-            (textures(), "test/increment#2", "image", "AFTER_WRITE"),
+        for (graph, step, resource) in [
+            (buffers(), "test/copy_values", "values"),
+            (textures(), "test/copy_stored", "image"),
         ] {
             let Some(mut backend) = validated(&device, true) else {
                 return;
@@ -106,11 +118,11 @@ fn a_missing_barrier_is_an_error() {
             backend.execute(&good, &Inputs::new()).unwrap();
             match backend.execute(&bad, &Inputs::new()) {
                 Err(BackendError::Validation { messages }) => {
-                    let hazard = messages.iter().any(|message| {
-                        message.contains("SYNC-HAZARD")
-                            && message.replace('-', "_").contains(hazard)
+                    let found = messages.iter().any(|message| {
+                        message.contains("SYNC-HAZARD-READ-AFTER-WRITE")
+                            && message.contains(resource)
                     });
-                    assert!(hazard, "{messages:?}");
+                    assert!(found, "{messages:?}");
                 }
                 other => panic!("{device}: the missing barrier of `{step}` gave {other:?}"),
             }

@@ -296,6 +296,18 @@ const KERNELS: &[(&str, &str)] = &[
              textureStore(image, id.xy, vec4<f32>(value, 0.0, 0.0, 1.0));
          }",
     ),
+    // Reads through a storage binding.
+    (
+        "test/copy_stored",
+        "@group(0) @binding(0) var source: texture_storage_2d<r32float, read>;
+         @group(0) @binding(1) var result: texture_storage_2d<r32float, write>;
+         @compute @workgroup_size(8, 8)
+         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+             let size = textureDimensions(result);
+             if (id.x >= size.x || id.y >= size.y) { return; }
+             textureStore(result, id.xy, textureLoad(source, id.xy));
+         }",
+    ),
     // Samples at texel corners, where linear filtering takes the mean of four.
     (
         "test/sample",

@@ -2,9 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use etalon::effects::{CameraParams, DepthRange, EffectEntry, EffectError, SceneInputs};
+use etalon::effects::{EffectEntry, EffectError};
 use etalon::graph::{Graph, GraphError};
-use etalon_core::backend::Inputs;
 use etalon_scenes::exr_frame::{ExrError, ExrOptions, load_exr};
 use etalon_scenes::frame::FrameError;
 use etalon_scenes::scenes::WorldError;
@@ -113,33 +112,8 @@ fn read(path: &Path) -> Result<Frame, SourceError> {
 /// If the effect refuses the frame.
 pub fn graph(frame: &Frame, effect: &EffectEntry) -> Result<Graph, SourceError> {
     let mut graph = Graph::new();
-    let projection = frame.camera.projection;
-    let inputs = SceneInputs {
-        colour: graph.import_texture("colour", frame.colour.desc)?,
-        depth: graph.import_texture("depth", frame.depth.desc)?,
-        normal: graph.import_texture("normal", frame.normal.desc)?,
-        specular: graph.import_texture("specular", frame.specular.desc)?,
-        velocity: Some(graph.import_texture("velocity", frame.velocity.desc)?),
-        camera: CameraParams {
-            scale: projection.scale().as_vec2(),
-            centre: Default::default(),
-            near: projection.near() as f32,
-            depth: DepthRange::ReversedInfinite,
-        },
-        delta_time: DELTA_TIME,
-    };
+    let inputs = frame.import(&mut graph, DELTA_TIME)?;
     let result = (effect.build)(&mut graph, &inputs)?;
     graph.output("result", result)?;
     Ok(graph)
-}
-
-/// The frame's images under the names that [`graph`] imports.
-#[must_use]
-pub fn inputs(frame: &Frame) -> Inputs<'_> {
-    frame
-        .images()
-        .into_iter()
-        .fold(Inputs::new(), |inputs, (name, image)| {
-            inputs.texture(name, image)
-        })
 }

@@ -20,7 +20,7 @@ use thiserror::Error;
 use crate::size::Size;
 use crate::test_backends::model::BackendKind;
 use backends::open;
-use frame::{Source, SourceError, graph, inputs};
+use frame::{Source, SourceError, graph};
 use outcome::{Capture, Label, Outcome, OutcomeError, Run, Time};
 use plant::{Fault, PlantError};
 
@@ -267,7 +267,7 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
         times: Vec::new(),
     };
     for number in 0..job.frames {
-        let mut execution = backend.execute(&plan, &inputs(&frame))?;
+        let mut execution = backend.execute(&plan, &frame.inputs())?;
         if let Some(fault) = &job.plant {
             fault.in_captures(&mut execution)?;
         }

@@ -67,12 +67,12 @@ fn header(body: &mut String, report: &Report) {
     let _ = write!(
         body,
         "<header>\n<h1>Backends compared</h1>\n<p class=\"verdict {class}\">{verdict}</p>\n\
-         <p class=\"muted\">{} × {} pixels · frames: {} · effect: {} · scenes: {} · arithmetic: {} · \
+         <p class=\"muted\">{} × {} pixels · frames: {} · effects: {} · scenes: {} · arithmetic: {} · \
          required: {}</p>\n",
         settings.width,
         settings.height,
         settings.frames,
-        escape(&settings.effect),
+        escape(&settings.effects.join(", ")),
         escape(&settings.scenes.join(", ")),
         escape(&settings.arithmetic.join(", ")),
         escape(&required.join(", ")),
@@ -93,22 +93,10 @@ fn executors(body: &mut String, report: &Report) {
          <th scope=\"col\">Driver</th></tr></thead>\n<tbody>\n",
     );
     for executor in &report.executors {
-        let statuses = report
-            .runs
-            .iter()
-            .filter(|run| run.executor == executor.id)
-            .map(|run| &run.status);
-        let device = statuses.clone().find_map(|status| match status {
-            Status::Ran { device, .. } => Some(device),
-            _ => None,
-        });
-        let worst = statuses.max_by_key(|status| status.is_fault());
-        let class = if worst.is_some_and(Status::is_fault) {
-            " class=\"bad\""
-        } else {
-            ""
-        };
-        let [name, api, driver] = device
+        let (word, fault) = report.state(&executor.id);
+        let class = if fault { " class=\"bad\"" } else { "" };
+        let [name, api, driver] = report
+            .device(&executor.id)
             .map_or([""; 3], |device| {
                 [
                     device.device.as_str(),
@@ -119,9 +107,8 @@ fn executors(body: &mut String, report: &Report) {
             .map(escape);
         let _ = writeln!(
             body,
-            "<tr{class}><th scope=\"row\">{}</th><td>{}</td><td>{name}</td><td>{api}</td><td>{driver}</td></tr>",
+            "<tr{class}><th scope=\"row\">{}</th><td>{word}</td><td>{name}</td><td>{api}</td><td>{driver}</td></tr>",
             escape(&executor.id),
-            worst.map_or("not run", Status::word),
         );
     }
     body.push_str("</tbody>\n</table></div>\n</section>\n");

@@ -39,7 +39,7 @@ pub enum TestError {
     #[error(transparent)]
     Setup(#[from] SetupError),
     /// A driver that is not there.
-    #[error("there is no driver `{name}`; found: {}", if found.is_empty() { "none".to_owned() } else { found.join(", ") })]
+    #[error("there is no driver `{name}`; there are {}", found.join(", "))]
     NoDriver {
         /// As asked.
         name: String,
@@ -81,15 +81,15 @@ pub enum TestError {
 /// # Errors
 /// If no report could be made; disagreement is in the report.
 pub fn run(options: &Options, program: &Path) -> Result<Report, TestError> {
-    find_effect(&options.effect)?;
+    let effects = effects(options)?;
     let sources = sources(options)?;
     if options.setup {
         setup::run()?;
     }
     let found = drivers::find(&drivers::Environment::of_process());
-    let executors = executors(&choose(&found.drivers, &options.drivers)?);
+    let executors = executors(&found.drivers, &options.drivers)?;
     check_planted(options, &executors)?;
-    let cases = sources.len() * options.arithmetic.names().len();
+    let cases = sources.len() * effects.len() * options.arithmetic.names().len();
     let mut bench = Bench {
         options,
         program,
@@ -99,18 +99,21 @@ pub fn run(options: &Options, program: &Path) -> Result<Report, TestError> {
             ok: false,
             problems: Vec::new(),
             notes: Vec::new(),
-            settings: settings(options, &sources)?,
-            executors,
+            settings: settings(options, &sources, &effects)?,
+            executors: executors.clone(),
             unusable_manifests: found.bad,
             runs: Vec::new(),
             comparisons: Vec::new(),
         },
     };
     for source in &sources {
-        for &arithmetic in options.arithmetic.names() {
-            bench.run_case(source, arithmetic)?;
+        for &effect in &effects {
+            for &arithmetic in options.arithmetic.names() {
+                bench.run_case(source, effect, arithmetic, &executors)?;
+            }
         }
     }
+    bench.run_parts(&sources, &effects)?;
     bench.progress.finish_and_clear();
     let mut report = bench.report;
     evaluate::conclude(&mut report);
@@ -128,32 +131,39 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// Runs a frame in one arithmetic on every executor, compares, and forgets
-    /// the texels.
-    fn run_case(&mut self, source: &Source, arithmetic: ArithmeticName) -> Result<(), TestError> {
+    /// Applies an effect to a frame on executors, compares, and forgets the
+    /// texels.
+    fn run_case(
+        &mut self,
+        source: &Source,
+        effect: &str,
+        arithmetic: ArithmeticName,
+        executors: &[Executor],
+    ) -> Result<(), TestError> {
         let case = Case {
             scene: source.name(),
+            effect: effect.to_owned(),
             arithmetic: arithmetic.name().to_owned(),
         };
         let work = tempfile::tempdir().map_err(|source| TestError::Io {
             path: std::env::temp_dir(),
             source,
         })?;
-        let mut done: Vec<(Executor, Run, PathBuf)> = Vec::new();
-        for (number, executor) in self.report.executors.clone().into_iter().enumerate() {
+        let mut done: Vec<(&Executor, Run, PathBuf)> = Vec::new();
+        for (number, executor) in executors.iter().enumerate() {
             self.progress
                 .set_message(format!("{case}: {}", executor.id));
             let folder = work.path().join(number.to_string());
-            let (status, run) = match self.absent(&executor) {
+            let (status, run) = match self.absent(executor) {
                 Some(status) => (status, None),
                 None => {
                     std::fs::create_dir(&folder).map_err(|source| TestError::Io {
                         path: folder.clone(),
                         source,
                     })?;
-                    let job = self
-                        .options
-                        .job(source, arithmetic, &executor, folder.clone());
+                    let job =
+                        self.options
+                            .job(source, effect, arithmetic, executor, folder.clone());
                     let limit = Duration::from_secs(self.options.timeout);
                     supervise::run(self.program, &job, &executor.target, limit)
                 }
@@ -179,6 +189,41 @@ impl Bench<'_> {
             let tolerance = tolerances::of(&case, pair);
             let compared = evaluate::compare_pair(&case, pair, tolerance, self.gallery.as_mut())?;
             self.report.comparisons.extend(compared);
+        }
+        Ok(())
+    }
+
+    /// Where an executor lacks what a combination of effects needs, as OpenGL
+    /// lacks formats, applies the other effects one by one to the first frame:
+    /// it is tested as far as it goes.
+    fn run_parts(&mut self, sources: &[Source], done: &[&str]) -> Result<(), TestError> {
+        let Some(source) = sources.first() else {
+            return Ok(());
+        };
+        let lacks_something = |executor: &&Executor| {
+            let unsupported = |run: &RunReport| {
+                run.executor == executor.id && matches!(run.status, Status::Unsupported { .. })
+            };
+            executor.backend == BackendKind::Cpu || self.report.runs.iter().any(unsupported)
+        };
+        let executors: Vec<Executor> = self
+            .report
+            .executors
+            .iter()
+            .filter(lacks_something)
+            .cloned()
+            .collect();
+        if executors.len() < 2 {
+            return Ok(());
+        }
+        for part in etalon::effects::effects()
+            .iter()
+            .filter(|effect| !done.contains(&effect.name))
+        {
+            for &arithmetic in self.options.arithmetic.names() {
+                self.progress.inc_length(executors.len() as u64);
+                self.run_case(source, part.name, arithmetic, &executors)?;
+            }
         }
         Ok(())
     }
@@ -214,35 +259,49 @@ fn check_planted(options: &Options, executors: &[Executor]) -> Result<(), TestEr
     Ok(())
 }
 
-/// The drivers asked for among those found.
-fn choose(found: &[Driver], asked: &[String]) -> Result<Vec<Driver>, TestError> {
-    if asked.iter().any(|name| name == "all") {
-        return Ok(found.to_vec());
-    }
-    let choose = |name: &String| {
-        found
-            .iter()
-            .find(|driver| driver.name == *name)
-            .cloned()
-            .ok_or_else(|| TestError::NoDriver {
-                name: name.clone(),
-                found: found.iter().map(|driver| driver.name.clone()).collect(),
-            })
+/// Everyone who is to run: the interpreter, then each driver asked for by wgpu
+/// and by ash, then OpenGL.
+fn executors(drivers: &[Driver], asked: &[String]) -> Result<Vec<Executor>, TestError> {
+    const GL: &str = "gl";
+    let is_known = |name: &str| {
+        name == "all" || name == GL || drivers.iter().any(|driver| driver.name == name)
     };
-    asked.iter().map(choose).collect()
-}
-
-/// Everyone who is to run: the interpreter, then each driver by wgpu and by
-/// ash, then OpenGL.
-fn executors(drivers: &[Driver]) -> Vec<Executor> {
+    if let Some(unknown) = asked.iter().find(|name| !is_known(name)) {
+        let found = drivers
+            .iter()
+            .map(|driver| driver.name.as_str())
+            .chain([GL]);
+        return Err(TestError::NoDriver {
+            name: unknown.clone(),
+            found: found.map(str::to_owned).collect(),
+        });
+    }
+    let wanted = |name: &str| asked.iter().any(|asked| asked == "all" || asked == name);
     let mut executors = vec![Executor::new(BackendKind::Cpu, Target::Host)];
-    for driver in drivers {
+    for driver in drivers.iter().filter(|driver| wanted(&driver.name)) {
         for backend in [BackendKind::Wgpu, BackendKind::Ash] {
             executors.push(Executor::new(backend, Target::Vulkan(driver.clone())));
         }
     }
-    executors.push(Executor::new(BackendKind::Wgpu, Target::Gl));
-    executors
+    if wanted(GL) {
+        executors.push(Executor::new(BackendKind::Wgpu, Target::Gl));
+    }
+    Ok(executors)
+}
+
+/// The effects asked for.
+fn effects(options: &Options) -> Result<Vec<&'static str>, UnknownEffect> {
+    if options.effect.iter().any(|name| name == "all") {
+        return Ok(etalon::effects::effects()
+            .iter()
+            .map(|effect| effect.name)
+            .collect());
+    }
+    options
+        .effect
+        .iter()
+        .map(|name| Ok(find_effect(name)?.name))
+        .collect()
 }
 
 /// The frames to run on; unknown scenes are refused before anything runs.
@@ -267,7 +326,11 @@ fn sources(options: &Options) -> Result<Vec<Source>, SourceError> {
 }
 
 /// What was asked for, as the report has it.
-fn settings(options: &Options, sources: &[Source]) -> Result<Settings, SourceError> {
+fn settings(
+    options: &Options,
+    sources: &[Source],
+    effects: &[&str],
+) -> Result<Settings, SourceError> {
     let mut size = (options.size.width, options.size.height);
     if let [file @ Source::File(_)] = sources {
         let frame = file.frame()?.size();
@@ -277,7 +340,7 @@ fn settings(options: &Options, sources: &[Source]) -> Result<Settings, SourceErr
         width: size.0,
         height: size.1,
         frames: options.frames,
-        effect: options.effect.clone(),
+        effects: effects.iter().map(|&effect| effect.to_owned()).collect(),
         scenes: sources.iter().map(Source::name).collect(),
         arithmetic: options
             .arithmetic

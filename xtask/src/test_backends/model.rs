@@ -92,8 +92,8 @@ pub struct Settings {
     pub height: u32,
     /// Frames run one after another, histories carried over.
     pub frames: u32,
-    /// The effect applied.
-    pub effect: String,
+    /// The effects applied, each by itself.
+    pub effects: Vec<String>,
     /// Names of the scenes, or the file of the frame.
     pub scenes: Vec<String>,
     /// `strict`, `fast` or both.
@@ -102,18 +102,24 @@ pub struct Settings {
     pub required: Vec<BackendKind>,
 }
 
-/// One scene in one arithmetic: what is compared with each other.
+/// One effect on one scene in one arithmetic: what is compared with each other.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct Case {
     /// The scene, or the file of the frame.
     pub scene: String,
+    /// The effect.
+    pub effect: String,
     /// `strict` or `fast`.
     pub arithmetic: String,
 }
 
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}, {} arithmetic", self.scene, self.arithmetic)
+        write!(
+            f,
+            "{} on {}, {} arithmetic",
+            self.effect, self.scene, self.arithmetic
+        )
     }
 }
 
@@ -287,6 +293,41 @@ impl Report {
         self.runs
             .iter()
             .find(|run| run.case == *case && run.executor == executor)
+    }
+
+    /// How an executor did in all cases together, in a few words, and whether
+    /// that is a fault.
+    #[must_use]
+    pub fn state(&self, executor: &str) -> (&'static str, bool) {
+        let statuses = || {
+            self.runs
+                .iter()
+                .filter(|run| run.executor == executor)
+                .map(|run| &run.status)
+        };
+        if let Some(fault) = statuses().find(|status| status.is_fault()) {
+            return (fault.word(), true);
+        }
+        let ran = |status: &Status| matches!(status, Status::Ran { .. });
+        let word = match statuses().find(|status| !ran(status)) {
+            Some(_) if statuses().any(ran) => "ran in part",
+            Some(status) => status.word(),
+            None if statuses().next().is_some() => "ran",
+            None => "not run",
+        };
+        (word, false)
+    }
+
+    /// The device an executor ran on.
+    #[must_use]
+    pub fn device(&self, executor: &str) -> Option<&Device> {
+        self.runs
+            .iter()
+            .filter(|run| run.executor == executor)
+            .find_map(|run| match &run.status {
+                Status::Ran { device, .. } => Some(device),
+                _ => None,
+            })
     }
 
     /// The comparisons of a case.

@@ -52,9 +52,14 @@ pub struct Options {
     /// depth, normals and so on
     #[arg(long, value_name = "FRAME.exr")]
     pub input: Option<PathBuf>,
-    /// The effect to apply
-    #[arg(long, value_name = "NAME", default_value = "chain")]
-    pub effect: String,
+    /// Effects to apply, each by itself; `all` for every one
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "all|NAMES",
+        default_value = "chain"
+    )]
+    pub effect: Vec<String>,
     /// How often each frame is run; effects that remember need two
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=100))]
     pub frames: u32,
@@ -66,7 +71,7 @@ pub struct Options {
         default_value = "cpu,wgpu,ash"
     )]
     pub require: Vec<BackendKind>,
-    /// Vulkan drivers to use: `all`, or names like `lavapipe,swiftshader`
+    /// Drivers to use: `all`, or names like `lavapipe,swiftshader,gl`
     #[arg(
         long,
         value_delimiter = ',',
@@ -102,10 +107,11 @@ pub struct Options {
 }
 
 impl Options {
-    /// The job that runs a frame in one arithmetic on one executor.
+    /// The job that applies an effect to a frame on one executor.
     pub(super) fn job(
         &self,
         source: &Source,
+        effect: &str,
         arithmetic: ArithmeticName,
         executor: &Executor,
         out: PathBuf,
@@ -125,7 +131,7 @@ impl Options {
             scene,
             input,
             size: self.size,
-            effect: self.effect.clone(),
+            effect: effect.to_owned(),
             arithmetic,
             frames: self.frames,
             threads: self.threads,

@@ -45,27 +45,14 @@ fn executors(text: &mut String, report: &Report) {
     text.push_str("Executors\n");
     let mut rows = Vec::new();
     for (number, executor) in report.executors.iter().enumerate() {
-        let statuses = report
-            .runs
-            .iter()
-            .filter(|run| run.executor == executor.id)
-            .map(|run| &run.status);
-        let what = statuses.clone().find_map(|status| match status {
-            Status::Ran { device, .. } => Some(format!(
-                "{}, {}, {}",
-                device.device, device.api, device.driver
-            )),
-            _ => None,
-        });
-        // The worst that happened in any case.
-        let word = statuses
-            .max_by_key(|status| status.is_fault())
-            .map_or("not run", Status::word);
+        let device = report.device(&executor.id);
         rows.push(vec![
             format!("[{}]", number + 1),
             executor.id.clone(),
-            word.to_owned(),
-            what.unwrap_or_default(),
+            report.state(&executor.id).0.to_owned(),
+            device.map_or_else(String::new, |device| {
+                format!("{}, {}, {}", device.device, device.api, device.driver)
+            }),
         ]);
     }
     align(text, &rows, &[Align::Left; 4]);

@@ -42,7 +42,7 @@ fn a_noisy_texel_fails_and_its_pass_and_executor_are_named() {
     assert_eq!(report.problems.len(), 2, "{:?}", report.problems);
     assert!(
         report.problems[0].starts_with(
-            "ash/lavapipe disagrees with cpu (test <scene>, strict arithmetic), first in pass `ssr/mix`, output \
+            "ash/lavapipe disagrees with cpu (chain on test <scene>, strict arithmetic), first in pass `ssr/mix`, output \
              `target`, frame 0: 1 texel (0.019 %) not bit equal; 1 of 3 outputs are affected"
         ),
         "{:?}",
@@ -177,7 +177,7 @@ fn crashes_and_errors_are_problems() {
         let report = report_with(&fixtures, statuses, None);
         assert!(!report.ok);
         let expected = format!(
-            "ash/lavapipe {} (test <scene>, strict arithmetic): signal: 11",
+            "ash/lavapipe {} (chain on test <scene>, strict arithmetic): signal: 11",
             status.word()
         );
         assert!(report.problems.contains(&expected), "{:?}", report.problems);

@@ -35,6 +35,7 @@ fn executors() -> Vec<Executor> {
 fn case() -> Case {
     Case {
         scene: "test <scene>".into(),
+        effect: "chain".into(),
         arithmetic: "strict".into(),
     }
 }
@@ -181,7 +182,7 @@ fn report_with(
             width: 96,
             height: 54,
             frames: 1,
-            effect: "chain".into(),
+            effects: vec!["chain".into()],
             scenes: vec![case().scene],
             arithmetic: vec!["strict".into()],
             required: vec![BackendKind::Cpu, BackendKind::Wgpu, BackendKind::Ash],

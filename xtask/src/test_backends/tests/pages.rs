@@ -70,6 +70,7 @@ fn the_json_has_every_comparison() {
     let failed = failed[0];
     for (key, value) in [
         ("scene", "test <scene>"),
+        ("effect", "chain"),
         ("arithmetic", "strict"),
         ("pass", "ssr/mix"),
         ("binding", "target"),

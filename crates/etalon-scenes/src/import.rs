@@ -35,6 +35,8 @@ impl Frame {
     #[must_use]
     pub fn inputs(&self) -> Inputs<'_> {
         let images = self.images().into_iter();
-        images.fold(Inputs::new(), |inputs, (name, image)| inputs.texture(name, image))
+        images.fold(Inputs::new(), |inputs, (name, image)| {
+            inputs.texture(name, image)
+        })
     }
 }

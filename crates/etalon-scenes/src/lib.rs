@@ -3,7 +3,7 @@
 //! * [`camera`]: the camera and the one projection every frame uses.
 //! * [`frame`]: what a rendered frame hands to the effects.
 //! * [`trace`](mod@trace): an exact f64 ray caster, and the true reflections in a scene.
-//! * [`scenes`]: a registry of procedural scenes.
+//! * [`scenes`](mod@scenes): a registry of procedural scenes.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
 //!

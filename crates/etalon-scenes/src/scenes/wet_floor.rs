@@ -179,9 +179,13 @@ fn solids(scene: &mut SceneBuilder) {
     );
     scene.object(ball(-2.95, 1.75, 0.34), plastic(0.10, 0.45, 0.75, 0.2));
     scene.object(ball(0.12, 2.35, 0.24), plastic(0.85, 0.16, 0.12, 0.2));
+    // One on top of the green block.
     scene.object(
-        ball(2.72, 0.62 + 0.52, 0.0001 + 0.20),
-        plastic(0.9, 0.85, 0.2, 0.2),
+        Shape::Sphere {
+            center: DVec3::new(2.62, 0.84 + 0.21, 1.20),
+            radius: 0.21,
+        },
+        plastic(0.90, 0.80, 0.12, 0.2),
     );
     // A low plinth with the knot on it.
     scene.object(

@@ -27,6 +27,12 @@ use crate::upload::describe;
 ///
 /// Names of imports that the plan has no need for are ignored: what is culled
 /// needs no input.
+///
+/// All must belong to the device the backend has adopted, or to another of the
+/// same [`wgpu::Instance`], which is refused; wgpu cannot tell objects of
+/// different instances apart. A surface's texture is a new one each frame, for
+/// which new bind groups are made each time: better to write into a texture
+/// that stays and draw that to the surface.
 #[derive(Clone, Debug, Default)]
 pub struct WgpuBindings<'a> {
     imports: BTreeMap<Cow<'a, str>, Given<'a>>,
@@ -365,7 +371,8 @@ pub enum WgpuOutput {
 /// The outputs of a recorded plan by name.
 ///
 /// Textures and buffers of the backend's own belong to the plan: the next
-/// recording of a plan of the same structure writes over them.
+/// recording of a plan of the same structure writes over them. Outputs that are
+/// an import or a history as it is are not among them.
 #[derive(Clone, Debug, Default)]
 pub struct WgpuOutputs(pub(crate) Vec<(String, WgpuOutput)>);
 

@@ -27,6 +27,12 @@
 //! very words that the Vulkan backend of Etalon runs are used, see
 //! [`WgpuBackend::keeps_strict_arithmetic`].
 //!
+//! # OpenGL
+//! wgpu's OpenGL has no views of single layers or of part of a texture's mips,
+//! copies from what it can render to only, and binds and copies 3D textures by
+//! their first slice. Steps that would need more are refused; most effects'
+//! kernels run.
+//!
 //! # Errors
 //! What a device cannot do is a [`BackendError`](etalon_core::backend::BackendError)
 //! that names the step, before wgpu sees it wherever it can be known; what wgpu

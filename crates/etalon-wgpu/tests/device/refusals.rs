@@ -7,7 +7,7 @@ use etalon_core::graph::{ClearValue, Graph};
 use etalon_core::image::ImageData;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanOptions, Step};
-use etalon_core::resource::{BufferDesc, Limits, TextureDesc};
+use etalon_core::resource::{BufferDesc, Extent, Limits, TextureDesc};
 use etalon_wgpu::{WgpuBackend, WgpuOptions, enumerate, wgpu};
 
 /// Plans for a device with other limits.
@@ -372,4 +372,59 @@ fn steady_frames_from_the_host_make_nothing_either() {
             assert_eq!(counters, *made.get_or_insert(counters));
         }
     });
+}
+
+#[test]
+fn a_copy_for_the_host_that_no_buffer_holds_is_refused_before_anything_is_made() {
+    on_vulkan(|backend| {
+        // Rows of one byte take 256 in a buffer.
+        let limits = backend.limits();
+        let height = limits.max_texture_2d;
+        let largest = backend.device().limits().max_buffer_size;
+        let layers = u32::try_from(largest / 256 / u64::from(height) + 1).unwrap();
+        if layers > limits.max_texture_layers {
+            println!("skipped: a buffer of {largest} bytes holds anything");
+            return;
+        }
+        let mut graph = Graph::new();
+        let desc = TextureDesc {
+            extent: Extent {
+                width: 1,
+                height,
+                depth_or_layers: layers,
+            },
+            ..TextureDesc::d2(1, 1, Format::R8Unorm)
+        };
+        let texture = graph.texture("thin", desc);
+        let texture = graph.clear(texture, ClearValue::Float([0.0; 4])).unwrap();
+        graph.output("thin", texture).unwrap();
+        let plan = plan(backend, &graph, &KernelLibrary::new(), Capture::Outputs);
+        let before = backend.counters();
+        let error = backend.execute(&plan, &Inputs::new()).unwrap_err();
+        let BackendError::OutOfMemory { bytes, .. } = error else {
+            panic!("{error}");
+        };
+        assert_eq!(bytes, 256 * u64::from(height) * u64::from(layers));
+        let after = backend.counters();
+        assert_eq!(
+            (after.textures, after.bytes),
+            (before.textures, before.bytes)
+        );
+    });
+}
+
+#[test]
+fn backends_can_be_moved_between_threads() {
+    fn assert_send<T: Send>() {}
+    assert_send::<WgpuBackend>();
+    let Some(mut backend) = open(Route::Vulkan) else {
+        return;
+    };
+    let (library, graph) = dispatch("1", 1, [1, 1, 1]);
+    std::thread::spawn(move || {
+        let execution = run(&mut backend, &graph, &library, &Inputs::new());
+        assert_eq!(words(&execution, "seen"), [5]);
+    })
+    .join()
+    .unwrap();
 }

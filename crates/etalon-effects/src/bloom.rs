@@ -7,8 +7,8 @@
 //!
 //! # Source
 //! J. Jimenez, "Next Generation Post Processing in Call of Duty: Advanced
-//! Warfare", SIGGRAPH 2014: the 13-tap filter down, the 3 × 3 tent up, and the
-//! weighting against flicker.
+//! Warfare", SIGGRAPH 2014: the 13-tap filter down and the 3 × 3 tent up.
+//! B. Karis, "Tone mapping", 2013: the weighting against flicker.
 
 use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
@@ -27,9 +27,9 @@ pub struct Bloom {
     /// Softness of the threshold as a share of it, in `[0, 1]`: 0 is a step,
     /// which flickers where a surface's brightness wavers around it.
     pub knee: f32,
-    /// Weighs the brightest texels less in the first step, so that single ones
-    /// do not flicker. It dims the bloom of small lights. Costs 5 divisions per
-    /// texel of the half-sized picture.
+    /// Weighs each texel by the reciprocal of its brightness in the first step,
+    /// so that single bright ones do not flicker. It dims the bloom of small
+    /// lights. Costs a division per texel looked at.
     pub suppress_fireflies: bool,
     /// How many times the picture is halved, in `[1, 12]`; fewer where it is
     /// too small. Each level doubles the reach of the bloom and costs a quarter

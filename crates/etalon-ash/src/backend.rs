@@ -3,29 +3,23 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use ash::vk;
 use etalon_core::backend::{Backend, BackendError, BackendInfo, Counters, Execution, Inputs};
-use etalon_core::plan::{MemoryModel, Plan, ResourceKind, Step};
+use etalon_core::plan::{MemoryModel, Plan, ResourceKind};
 use etalon_core::resource::Limits;
 
-use crate::buffer::Buffer;
 use crate::commands::{Barriers, Commands};
 use crate::device::{AdoptedDevice, Device};
-use crate::engine::{
-    self, AdoptedBuffer, AdoptedTexture, AshBindings, AshBuffer, AshOutputs, AshTexture, Given,
-    TextureState,
-};
-use crate::error::{NAME, malformed, unsupported};
+use crate::error::{NAME, malformed};
 use crate::history::{self, Histories, Pair};
-use crate::host::{self, HostQueue, HostSide};
-use crate::image::{self, Image};
+use crate::host::{self, HostSide};
 use crate::instance::Instance;
 use crate::memory::DeviceMemory;
 use crate::prepared::{Prepared, Shared};
+use crate::queue::HostQueue;
 use crate::run::Run;
 use crate::sets::Parts;
 use crate::validation::{Validation, ValidationLog};
-use crate::{Resource, physical};
+use crate::{Resource, handover, physical};
 
 /// How a backend is made.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -65,16 +59,16 @@ impl Default for AshOptions {
 
 /// Runs plans on a Vulkan device. See the [crate documentation](crate).
 pub struct AshBackend {
-    options: AshOptions,
+    pub(crate) options: AshOptions,
     memory: DeviceMemory,
-    shared: Shared,
+    pub(crate) shared: Shared,
     /// By structure, the least recently used first.
-    prepared: Vec<(u64, Prepared)>,
-    histories: Histories,
+    pub(crate) prepared: Vec<(u64, Prepared)>,
+    pub(crate) histories: Histories,
     host: Option<HostQueue>,
     /// The engine's recordings that may not have left the GPU, oldest first.
-    under_way: VecDeque<u64>,
-    device: Arc<Device>,
+    pub(crate) under_way: VecDeque<u64>,
+    pub(crate) device: Arc<Device>,
 }
 
 impl std::fmt::Debug for AshBackend {
@@ -145,219 +139,9 @@ impl AshBackend {
         self.device.instance.log.clone()
     }
 
-    /// Makes an engine's image known, for [`AshBindings`].
-    ///
-    /// # Errors
-    /// [`BackendError::InputMismatch`] for a description that no image of the
-    /// device can have.
-    ///
-    /// # Safety
-    /// The image is of the backend's device, is as described, and lives as long
-    /// as the texture. Recordings that were given the texture have left the GPU
-    /// before it is destroyed.
-    pub unsafe fn adopt_texture(
-        &self,
-        adopted: AdoptedTexture,
-    ) -> Result<AshTexture, BackendError> {
-        let AdoptedTexture { image, desc, usage } = adopted;
-        image::check(&self.device, &desc, usage).map_err(|given| BackendError::InputMismatch {
-            name: format!("{image:?}"),
-            given,
-            wanted: "an image that this device can have".to_owned(),
-        })?;
-        Ok(AshTexture {
-            image: Image::adopted(&self.device, image, &desc, usage),
-            device: self.device.clone(),
-        })
-    }
-
-    /// Makes part of an engine's buffer known, for [`AshBindings`].
-    ///
-    /// # Errors
-    /// [`BackendError::InputMismatch`] for a part that is empty, too large or
-    /// not aligned.
-    ///
-    /// # Safety
-    /// The buffer is of the backend's device, was made for these usages, has
-    /// the bytes, and lives as long as the result. Recordings that were given
-    /// it have left the GPU before it is destroyed.
-    pub unsafe fn adopt_buffer(&self, adopted: AdoptedBuffer) -> Result<AshBuffer, BackendError> {
-        let AdoptedBuffer {
-            buffer,
-            offset,
-            bytes,
-            usage,
-        } = adopted;
-        let limits = &self.device.physical.limits;
-        let alignment = limits.min_storage_buffer_offset_alignment.max(4);
-        let most = self.limits().max_buffer_bytes;
-        if bytes == 0
-            || bytes % 4 != 0
-            || bytes > most
-            || offset % alignment != 0
-            || offset.checked_add(bytes).is_none()
-        {
-            return Err(BackendError::InputMismatch {
-                name: format!("{buffer:?}"),
-                given: format!("{bytes} bytes at byte {offset}"),
-                wanted: format!("a multiple of 4 bytes up to {most}, at a multiple of {alignment}"),
-            });
-        }
-        Ok(AshBuffer {
-            buffer: Buffer::adopted(&self.device, buffer, offset, bytes, usage),
-            device: self.device.clone(),
-        })
-    }
-
-    /// Records a plan into an engine's command buffer.
-    ///
-    /// Histories advance with each recording, so every one is to be submitted,
-    /// in the order of recording and to the queue that was adopted. A plan with
-    /// captures is refused: there is nobody to wait for them.
-    ///
-    /// # Errors
-    /// Wrong bindings and plans that the device cannot run, before anything is
-    /// made or recorded. After any other error the command buffer may hold part
-    /// of the commands; it is to be discarded.
-    ///
-    /// # Safety
-    /// * The command buffer was allocated from the backend's device, for the
-    ///   adopted queue's family, and is in the recording state outside a render
-    ///   pass.
-    /// * Textures and buffers are in the states they are said to be in when
-    ///   the commands run.
-    /// * The conditions of [`AshBackend::adopt`] hold.
-    pub unsafe fn record(
-        &mut self,
-        command_buffer: vk::CommandBuffer,
-        plan: &Plan,
-        bindings: &AshBindings<'_>,
-    ) -> Result<AshOutputs, BackendError> {
-        if let Some(step) = plan
-            .steps
-            .iter()
-            .find(|step| matches!(step.step, Step::Capture { .. }))
-        {
-            return Err(unsupported(
-                &step.name,
-                "a host that waits for it (plan with `Capture::None` for an engine's frame)",
-            ));
-        }
-        let given = self.given(plan, bindings)?;
-        let prepared = self.prepare(plan)?;
-        let pairs = self.histories.get(&self.device, plan)?;
-        let resources =
-            self.resources(
-                plan,
-                prepared,
-                &pairs,
-                |prepared, device, index| match given.get(index).and_then(Option::as_ref) {
-                    Some(Given {
-                        resource: Some(resource),
-                        ..
-                    }) => Ok(resource.clone()),
-                    _ => prepared.output(device, index, &plan.resources[index]),
-                },
-            )?;
-        let recording = self.begin_engine_recording();
-        // SAFETY: this function's own conditions.
-        let commands = unsafe { Commands::new(&self.device, command_buffer) };
-        let prepared = &mut self.prepared[prepared].1;
-
-        let mut before = Barriers::default();
-        let mut after = Barriers::default();
-        let mut outputs = AshOutputs::default();
-        for (index, (resource, given)) in resources.iter().zip(&given).enumerate() {
-            let Some(given) = given else { continue };
-            engine::leave(&mut after, resource, given.returns);
-            let ResourceKind::Output(names) = &plan.resources[index].kind else {
-                engine::arrive(&mut before, resource, given.arrives);
-                continue;
-            };
-            if given.resource.is_some() {
-                engine::wait(&mut before, resource, given.arrives);
-            } else {
-                engine::wait(&mut before, resource, prepared.left[index]);
-                prepared.left[index] = given.returns;
-            }
-            outputs.add(names, resource, given.returns)?;
-        }
-        commands.begin_label("etalon");
-        commands.barrier(&mut before);
-        let result = run(
-            &self.device,
-            &commands,
-            prepared,
-            &self.shared,
-            plan,
-            &resources,
-            &pairs,
-            recording,
-            false,
-        );
-        commands.barrier(&mut after);
-        commands.end_label();
-        result?;
-        self.histories.advance(plan);
-        Ok(outputs)
-    }
-
-    /// What an engine gives for each resource of a plan; `None` for what it
-    /// does not give.
-    fn given(
-        &self,
-        plan: &Plan,
-        bindings: &AshBindings<'_>,
-    ) -> Result<Vec<Option<Given>>, BackendError> {
-        let mut given = Vec::with_capacity(plan.resources.len());
-        // Identities of what is written, and of all, with their names.
-        let mut written: Vec<u64> = Vec::new();
-        let mut all: Vec<(u64, &str)> = Vec::new();
-        for planned in &plan.resources {
-            let found = match &planned.kind {
-                ResourceKind::Import(name) => Some(bindings.import(&self.device, name, planned)?),
-                ResourceKind::Output(names) => {
-                    Some(bindings.output(&self.device, names, planned)?)
-                }
-                _ => None,
-            };
-            if let Some(resource) = found.as_ref().and_then(|found| found.resource.as_ref()) {
-                all.push((resource.id(), &planned.name));
-                if planned.usages.iter().any(etalon_core::plan::Usage::writes) {
-                    written.push(resource.id());
-                }
-            }
-            given.push(found);
-        }
-        for id in written {
-            let mut same = all.iter().filter(|(other, _)| *other == id);
-            if let (Some((_, first)), Some((_, second))) = (same.next(), same.next()) {
-                return Err(BackendError::InputMismatch {
-                    name: (*second).to_owned(),
-                    given: format!("what is also given as `{first}`"),
-                    wanted: "something else, since one of them is written".to_owned(),
-                });
-            }
-        }
-        Ok(given)
-    }
-
-    /// Begins a recording of an engine's, by which an older one is done.
-    fn begin_engine_recording(&mut self) -> u64 {
-        let recording = self.device.begin_recording();
-        self.under_way.push_back(recording);
-        let most = usize::try_from(self.options.frames_in_flight).unwrap_or(usize::MAX);
-        while self.under_way.len() > most {
-            if let Some(done) = self.under_way.pop_front() {
-                self.device.complete(done);
-            }
-        }
-        recording
-    }
-
     /// Finds what was made for plans of this structure, or makes it. Returns
     /// its index, which is good until the next call.
-    fn prepare(&mut self, plan: &Plan) -> Result<usize, BackendError> {
+    pub(crate) fn prepare(&mut self, plan: &Plan) -> Result<usize, BackendError> {
         let structure = plan.structure();
         let found = self
             .prepared
@@ -380,7 +164,7 @@ impl AshBackend {
 
     /// The texture or buffer behind each number of a plan. `outside` finds
     /// imports and outputs.
-    fn resources(
+    pub(crate) fn resources(
         &mut self,
         plan: &Plan,
         prepared: usize,
@@ -452,9 +236,11 @@ impl AshBackend {
         let result = (|| {
             let commands = queue.begin()?;
             let mut before = Barriers::default();
-            for (index, resource) in resources.iter().enumerate() {
-                // An engine may have left outputs elsewhere.
-                engine::wait(&mut before, resource, prepared.left[index]);
+            // Where engines' recordings have left outputs.
+            for (resource, left) in resources.iter().zip(&prepared.left) {
+                if let Some(left) = left {
+                    handover::wait(&mut before, resource, *left);
+                }
             }
             commands.barrier(&mut before);
             if let Some(host) = &prepared.host {
@@ -482,7 +268,7 @@ impl AshBackend {
             self.device.complete(recording);
         }
         result?;
-        prepared.left.fill(TextureState::REST);
+        prepared.left.fill(None);
         self.histories.advance(plan);
         match &prepared.host {
             Some(host) => host.collect(plan),
@@ -496,7 +282,7 @@ impl AshBackend {
     clippy::too_many_arguments,
     reason = "both callers borrow them from one struct, each separately"
 )]
-fn run(
+pub(crate) fn run(
     device: &Arc<Device>,
     commands: &Commands<'_>,
     prepared: &mut Prepared,

@@ -282,7 +282,7 @@ impl Checker<'_> {
             return Err(unsupported(&step.name, what));
         }
         let alignment = limits.min_uniform_buffer_offset_alignment.max(1);
-        if u64::from(slice.offset) % alignment != 0 {
+        if !u64::from(slice.offset).is_multiple_of(alignment) {
             let what = format!(
                 "its uniform block at byte {}, not at a multiple of {alignment} (plan with this device's limits)",
                 slice.offset
@@ -313,7 +313,9 @@ impl Checker<'_> {
             }
             Groups::Indirect { buffer, offset } => {
                 let desc = self.buffer(&format!("step `{}`", step.name), *buffer)?;
-                if offset % 4 == 0 && offset.checked_add(12).is_some_and(|end| end <= desc.bytes) {
+                if offset.is_multiple_of(4)
+                    && offset.checked_add(12).is_some_and(|end| end <= desc.bytes)
+                {
                     Ok(())
                 } else {
                     Err(malformed(format!(
@@ -327,12 +329,14 @@ impl Checker<'_> {
 }
 
 /// Whether so many layers of a texture can be seen so.
-const fn suits(view: ViewDimension, dimension: Dimension, layers: u32) -> bool {
+fn suits(view: ViewDimension, dimension: Dimension, layers: u32) -> bool {
     match view {
         ViewDimension::D2 => !matches!(dimension, Dimension::D3) && layers == 1,
         ViewDimension::D2Array => !matches!(dimension, Dimension::D3),
         ViewDimension::Cube => matches!(dimension, Dimension::Cube) && layers == 6,
-        ViewDimension::CubeArray => matches!(dimension, Dimension::Cube) && layers % 6 == 0,
+        ViewDimension::CubeArray => {
+            matches!(dimension, Dimension::Cube) && layers.is_multiple_of(6)
+        }
         ViewDimension::D3 => matches!(dimension, Dimension::D3),
     }
 }

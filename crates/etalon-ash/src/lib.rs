@@ -6,6 +6,35 @@
 //! buffer, reading and writing the engine's own images and buffers. Nothing is
 //! submitted, waited for or destroyed that is the engine's.
 //!
+//! ```no_run
+//! # use ash::vk;
+//! # use etalon_ash::{AdoptedDevice, AdoptedTexture, AshBackend, AshBindings, AshOptions, TextureState};
+//! # use etalon_core::{Format, backend::BackendError, plan::Plan, resource::TextureDesc};
+//! # fn example(lent: AdoptedDevice, scene: vk::Image, commands: vk::CommandBuffer, plan: &Plan)
+//! # -> Result<(), BackendError> {
+//! // Once:
+//! // SAFETY: the handles are valid, and outlive the backend.
+//! let mut backend = unsafe { AshBackend::adopt(lent, AshOptions::default()) }?;
+//! let scene = AdoptedTexture {
+//!     image: scene,
+//!     desc: TextureDesc::d2(1920, 1080, Format::Rgba16Float),
+//!     usage: vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::SAMPLED,
+//! };
+//! // SAFETY: the image is as described, and outlives the texture.
+//! let scene = unsafe { backend.adopt_texture(scene) }?;
+//!
+//! // In every frame:
+//! let drawn = TextureState::COLOR_ATTACHMENT;
+//! let bindings = AshBindings::new()
+//!     .texture_in("scene", &scene, drawn, drawn)
+//!     .output_in("picture", TextureState::FRAGMENT_SAMPLED);
+//! // SAFETY: the command buffer is being recorded, and the scene was drawn before.
+//! let outputs = unsafe { backend.record(commands, plan, &bindings) }?;
+//! let picture: vk::ImageView = outputs.textures["picture"].view;
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # On its own
 //! [`AshBackend::new`] makes an instance and a device, and the
 //! [`Backend`](etalon_core::backend::Backend) trait runs plans with inputs
@@ -23,7 +52,8 @@
 //! [`AshOptions::plans_kept`] structures used last. A frame whose structure is
 //! among them allocates no memory, and creates no pipeline and no descriptor
 //! set; [`counters`](etalon_core::backend::Backend::counters) shows it.
-//! Pipelines are kept for as long as the backend.
+//! Pipelines are kept for as long as the backend. Counters of memory count what
+//! was asked of the allocator, which takes it from the driver in larger blocks.
 //!
 //! # Barriers and memory
 //! Both are the plan's. How usages become stages, accesses and layouts is one
@@ -38,6 +68,7 @@
 //! device has, and a queue that computes. [`enumerate`] lists what there is.
 
 mod backend;
+mod bindings;
 mod buffer;
 mod chains;
 mod check;
@@ -46,6 +77,7 @@ mod convert;
 mod device;
 mod engine;
 mod error;
+mod handover;
 mod heap;
 mod history;
 mod host;
@@ -55,6 +87,8 @@ mod memory;
 mod physical;
 mod pipeline;
 mod prepared;
+mod queue;
+mod record;
 mod run;
 mod sets;
 mod texels;
@@ -65,10 +99,11 @@ mod validation;
 use std::sync::Arc;
 
 pub use backend::{AshBackend, AshOptions};
+pub use bindings::AshBindings;
 pub use device::AdoptedDevice;
 pub use engine::{
-    AdoptedBuffer, AdoptedTexture, AshBindings, AshBuffer, AshOutputs, AshTexture, BufferState,
-    OutputBuffer, OutputTexture, TextureState,
+    AdoptedBuffer, AdoptedTexture, AshBuffer, AshOutputs, AshTexture, BufferState, OutputBuffer,
+    OutputTexture, TextureState,
 };
 pub use physical::{DeviceInfo, DeviceKind, Features, enumerate};
 pub use validation::{Validation, ValidationLog, ValidationMessage};

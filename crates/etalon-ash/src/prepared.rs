@@ -47,8 +47,8 @@ pub(crate) struct Prepared {
     /// By number in the plan: outputs for which the caller has no texture or
     /// buffer, made when first needed.
     outputs: Vec<Option<Resource>>,
-    /// By number in the plan: how those outputs were left.
-    pub(crate) left: Vec<TextureState>,
+    /// By number in the plan: how those outputs were left, if not at rest.
+    pub(crate) left: Vec<Option<TextureState>>,
     pub(crate) uniforms: Option<UniformRing>,
     pub(crate) bindings: Bindings,
     /// For runs whose inputs come from the host.
@@ -95,7 +95,7 @@ impl Prepared {
             heaps: Heaps::new(device, plan)?,
             pipelines,
             outputs: vec![None; plan.resources.len()],
-            left: vec![TextureState::REST; plan.resources.len()],
+            left: vec![None; plan.resources.len()],
             uniforms: UniformRing::new(device, plan.uniforms.len(), frames_in_flight)?,
             bindings: Bindings::default(),
             host: None,

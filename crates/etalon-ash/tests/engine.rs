@@ -13,7 +13,7 @@ use etalon_ash::{
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError};
 use etalon_core::graph::{ClearValue, Graph};
-use etalon_core::plan::Capture;
+use etalon_core::plan::{Capture, Plan, PlanOptions, TightMemory};
 use etalon_core::resource::{BufferDesc, TextureDesc};
 
 /// As clears leave it.
@@ -255,6 +255,50 @@ fn frames_in_flight_do_not_disturb_each_other() {
     });
 }
 
+/// Within one command buffer, synchronization validation sees what one frame
+/// leaves to the next.
+#[test]
+fn frames_wait_for_those_before() {
+    on_each(|engine| {
+        for tight in [false, true] {
+            let mut backend = adopt(engine, AshOptions::default());
+            let input = engine.image(
+                DESC,
+                vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+            );
+            // SAFETY: as described, and dropped before the engine.
+            let source = unsafe { backend.adopt_texture(input.adopted()) }.unwrap();
+            let seen = [engine.buffer(bytes(DESC)), engine.buffer(bytes(DESC))];
+            let commands = engine.begin();
+            engine.fill(commands, &input, 1.0);
+            let mut arrives = CLEARED;
+            for (frame, seen) in seen.iter().enumerate() {
+                let graph = accumulate(frame as f32);
+                let options = PlanOptions {
+                    limits: backend.limits(),
+                    memory: if tight {
+                        &TightMemory
+                    } else {
+                        backend.memory()
+                    },
+                    ..PlanOptions::default()
+                };
+                let plan = Plan::new(&graph, &common::kernels(), &options).unwrap();
+                let bindings = AshBindings::new()
+                    .texture_in("source", &source, arrives, TextureState::REST)
+                    .output_in("result", COPIED);
+                // SAFETY: as in the other tests.
+                let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+                engine.download(commands, outputs.textures["result"].image, DESC, seen);
+                arrives = TextureState::REST;
+            }
+            engine.wait(engine.submit(commands));
+            assert_eq!(engine.floats(&seen[0]), vec![1.0; 240]);
+            assert_eq!(engine.floats(&seen[1]), vec![3.0; 240]);
+        }
+    });
+}
+
 #[test]
 fn textures_made_anew_in_every_frame_do_not_pile_up() {
     on_each(|engine| {
@@ -409,7 +453,7 @@ fn wrong_bindings_are_named_before_anything_is_made() {
         let plan = common::plan(&backend, &accumulate(1.0), Capture::None);
         let before = backend.counters();
         let commands = engine.begin();
-        let mut error = |plan: &etalon_core::plan::Plan, bindings: &AshBindings<'_>| {
+        let mut error = |plan: &Plan, bindings: &AshBindings<'_>| {
             // SAFETY: as in the other tests.
             unsafe { backend.record(commands, plan, bindings) }.unwrap_err()
         };
@@ -496,14 +540,14 @@ fn features_that_are_missing_are_named() {
             .per_texel("result")
             .unwrap();
         graph.output("result", result).unwrap();
-        let mut options = etalon_core::plan::PlanOptions {
+        let mut options = PlanOptions {
             limits: backend.limits(),
-            ..etalon_core::plan::PlanOptions::default()
+            ..PlanOptions::default()
         };
         let kernels = common::kernels();
-        assert!(etalon_core::plan::Plan::new(&graph, &kernels, &options).is_err());
+        assert!(Plan::new(&graph, &kernels, &options).is_err());
         options.limits.extended_storage_formats = true;
-        let plan = etalon_core::plan::Plan::new(&graph, &kernels, &options).unwrap();
+        let plan = Plan::new(&graph, &kernels, &options).unwrap();
         let error = backend
             .execute(&plan, &etalon_core::backend::Inputs::new())
             .unwrap_err()
@@ -531,4 +575,51 @@ fn an_image_no_device_can_have_is_refused() {
             "{error}"
         );
     });
+}
+
+#[test]
+fn a_lent_device_also_runs_plans_from_the_host() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let source = common::image(20, 12, |x, _| x as f32);
+        let input = engine.image(
+            DESC,
+            vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+        );
+        // SAFETY: as described, and dropped before the engine.
+        let texture = unsafe { backend.adopt_texture(input.adopted()) }.unwrap();
+        let seen = engine.buffer(bytes(DESC));
+        // By turns, with one history between them.
+        for frame in 0..6 {
+            let total = if frame % 2 == 0 {
+                let graph = accumulate(1.0);
+                let inputs = etalon_core::backend::Inputs::new().texture("source", &source);
+                let execution = common::execute(&mut backend, &graph, &inputs);
+                common::reds(execution.output("result").unwrap())[5]
+            } else {
+                let plan = common::plan(&backend, &accumulate(1.0), Capture::None);
+                let commands = engine.begin();
+                engine.fill(commands, &input, 5.0);
+                let bindings = AshBindings::new()
+                    .texture_in("source", &texture, CLEARED, TextureState::REST)
+                    .output_in("result", COPIED);
+                // SAFETY: as in the other tests.
+                let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+                engine.download(commands, outputs.textures["result"].image, DESC, &seen);
+                engine.wait(engine.submit(commands));
+                engine.floats(&seen)[5]
+            };
+            assert_eq!(total, 6.0 * (frame + 1) as f32, "frame {frame}");
+        }
+    });
+}
+
+#[test]
+fn a_backend_can_move_between_threads() {
+    fn sent<T: Send>() {}
+    fn shared<T: Send + Sync>() {}
+    sent::<AshBackend>();
+    shared::<etalon_ash::AshTexture>();
+    shared::<etalon_ash::AshBuffer>();
+    shared::<etalon_ash::ValidationLog>();
 }

@@ -3,13 +3,14 @@
 mod common;
 
 use common::{execute, image, on_each, plan, reds};
-use etalon_ash::AshBackend;
+use etalon_ash::{AshBackend, AshOptions};
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError, CapturedData, Execution, Inputs};
 use etalon_core::graph::{ClearValue, Graph, GraphError};
 use etalon_core::image::ImageData;
-use etalon_core::plan::{Capture, Groups, Step};
-use etalon_core::resource::{BufferDesc, SamplerDesc, TextureDesc};
+use etalon_core::kernel::Arithmetic;
+use etalon_core::plan::{Capture, Groups, Plan, PlanOptions, Step};
+use etalon_core::resource::{BufferDesc, Limits, SamplerDesc, TextureDesc};
 
 /// The buffer captured as this output.
 fn words(execution: &Execution, output: &str) -> Vec<u32> {
@@ -446,10 +447,10 @@ fn a_frame_like_an_earlier_one_makes_nothing() {
 #[test]
 fn plans_used_long_ago_are_let_go() {
     for device in common::devices() {
-        let mut backend = common::backend_with(etalon_ash::AshOptions {
+        let mut backend = common::backend_with(AshOptions {
             device: Some(device),
             plans_kept: 2,
-            ..etalon_ash::AshOptions::default()
+            ..AshOptions::default()
         });
         let log = backend.validation_log();
         let run = |backend: &mut AshBackend, size: u32| {
@@ -517,7 +518,6 @@ fn what_the_device_cannot_have_is_refused_before_anything_is_made() {
     on_each(|backend| {
         let limits = backend.limits();
         let size = limits.max_texture_2d;
-        let desc = TextureDesc::d2(size, size, Format::Rgba32Float);
         let texture_of = |desc| {
             let mut graph = Graph::new();
             let texture = graph.texture("huge", desc);
@@ -528,23 +528,23 @@ fn what_the_device_cannot_have_is_refused_before_anything_is_made() {
         let too_wide = TextureDesc::d2(size + 1, 1, Format::R32Float);
         for desc in [too_wide, TextureDesc::d2(1, size + 1, Format::R32Float)] {
             // With the device's limits there is no plan, …
-            let options = etalon_core::plan::PlanOptions {
+            let options = PlanOptions {
                 limits,
-                ..etalon_core::plan::PlanOptions::default()
+                ..PlanOptions::default()
             };
             let graph = texture_of(desc);
             let kernels = common::kernels();
-            assert!(etalon_core::plan::Plan::new(&graph, &kernels, &options).is_err());
+            assert!(Plan::new(&graph, &kernels, &options).is_err());
             // … with others there is, and it is refused.
-            let options = etalon_core::plan::PlanOptions {
-                limits: etalon_core::resource::Limits {
+            let options = PlanOptions {
+                limits: Limits {
                     max_texture_2d: u32::MAX,
                     max_texture_bytes: u64::MAX,
                     ..limits
                 },
-                ..etalon_core::plan::PlanOptions::default()
+                ..PlanOptions::default()
             };
-            let plan = etalon_core::plan::Plan::new(&graph, &kernels, &options).unwrap();
+            let plan = Plan::new(&graph, &kernels, &options).unwrap();
             let before = backend.counters();
             let error = backend.execute(&plan, &Inputs::new()).unwrap_err();
             let BackendError::Unsupported { step, what } = &error else {
@@ -554,14 +554,50 @@ fn what_the_device_cannot_have_is_refused_before_anything_is_made() {
             assert!(what.contains("huge") && what.contains("limit"), "{error}");
             assert_eq!(backend.counters(), before);
         }
-        // Within the limits of each, more than there is of all.
-        let mut graph = Graph::new();
-        for index in 0..4 {
-            let texture = graph.texture(format!("large {index}"), desc);
-            let texture = graph.clear(texture, ClearValue::Float([0.0; 4])).unwrap();
-            graph.output(&format!("large {index}"), texture).unwrap();
-        }
-        let _ = graph;
+    });
+}
+
+#[test]
+fn memory_that_is_not_there_is_an_error_with_its_size() {
+    on_each(|backend| {
+        let source = image(4, 4, |_, _| 0.0);
+        let graph = chain(source.desc, 2).unwrap();
+        let good = plan(backend, &graph, Capture::Outputs);
+        let inputs = Inputs::new().texture("source", &source);
+        backend.execute(&good, &inputs).unwrap();
+        let mut huge = good.clone();
+        huge.texture_heap = 1 << 52;
+        let before = backend.counters().bytes;
+        let error = backend.execute(&huge, &inputs).unwrap_err();
+        let BackendError::OutOfMemory { what, bytes } = &error else {
+            panic!("{error}");
+        };
+        assert_eq!(*bytes, 1 << 52);
+        assert!(what.contains("transient textures"), "{error}");
+        assert_eq!(backend.counters().bytes, before);
+        // And the backend can be used again.
+        backend.execute(&good, &inputs).unwrap();
+    });
+}
+
+#[test]
+fn strict_kernels_run() {
+    on_each(|backend| {
+        let source = image(10, 10, |x, y| (x + y) as f32 * 0.1);
+        let graph = chain(source.desc, 3).unwrap();
+        let options = PlanOptions {
+            arithmetic: Arithmetic::Strict,
+            limits: backend.limits(),
+            capture: Capture::Outputs,
+            memory: backend.memory(),
+        };
+        let plan = Plan::new(&graph, &common::kernels(), &options).unwrap();
+        let execution = backend
+            .execute(&plan, &Inputs::new().texture("source", &source))
+            .unwrap();
+        // Each addition rounded, as it is here.
+        let expected: Vec<f32> = reds(&source).iter().map(|v| v + 1.0 + 1.0 + 1.0).collect();
+        assert_eq!(reds(execution.output("result").unwrap()), expected);
     });
 }
 
@@ -572,7 +608,7 @@ fn plans_that_were_tampered_with_are_refused() {
         let graph = chain(source.desc, 2).unwrap();
         let good = plan(backend, &graph, Capture::Outputs);
         let inputs = Inputs::new().texture("source", &source);
-        let mut refused = |what: &str, spoil: &dyn Fn(&mut etalon_core::plan::Plan)| {
+        let mut refused = |what: &str, spoil: &dyn Fn(&mut Plan)| {
             let mut plan = good.clone();
             spoil(&mut plan);
             let error = backend.execute(&plan, &inputs);
@@ -603,7 +639,6 @@ fn plans_that_were_tampered_with_are_refused() {
         });
         refused("uniforms that are not there", &|plan| plan.uniforms.clear());
         refused("a place outside the heap", &|plan| plan.texture_heap = 16);
-        drop(refused);
         backend.execute(&good, &inputs).unwrap();
     });
 }
@@ -613,12 +648,12 @@ fn plans_made_with_another_memory_model_run_all_the_same() {
     on_each(|backend| {
         let source = image(50, 30, |x, y| (x + y) as f32);
         let graph = chain(source.desc, 9).unwrap();
-        let options = etalon_core::plan::PlanOptions {
+        let options = PlanOptions {
             limits: backend.limits(),
             capture: Capture::Outputs,
-            ..etalon_core::plan::PlanOptions::default()
+            ..PlanOptions::default()
         };
-        let plan = etalon_core::plan::Plan::new(&graph, &common::kernels(), &options).unwrap();
+        let plan = Plan::new(&graph, &common::kernels(), &options).unwrap();
         let inputs = Inputs::new().texture("source", &source);
         for _ in 0..2 {
             let execution = backend.execute(&plan, &inputs).unwrap();

@@ -114,7 +114,7 @@ impl<'a> TexturePart<'a> {
         use wgpu::TextureViewDimension as V;
         let size = self.texture.size();
         let layers = size.depth_or_array_layers;
-        let cubic = size.width == size.height && layers % 6 == 0;
+        let cubic = size.width == size.height && layers.is_multiple_of(6);
         dimension
             == match self.texture.dimension() {
                 wgpu::TextureDimension::D3 => V::D3,

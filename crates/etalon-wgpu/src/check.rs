@@ -74,7 +74,7 @@ fn check_resource(gpu: &Gpu, step: &str, resource: &PlannedResource) -> Result<(
         ResourceDesc::Buffer(desc) => {
             desc.validate(&limits)
                 .map_err(|error| unsupported(step, format!("`{name}`: {error}")))?;
-            if desc.bytes % 4 == 0 {
+            if desc.bytes.is_multiple_of(4) {
                 Ok(())
             } else {
                 let bytes = desc.bytes;
@@ -144,7 +144,9 @@ fn check_copy_source(gpu: &Gpu, desc: &TextureDesc) -> Result<(), String> {
     }
     let format = desc.format;
     let size = desc.extent;
-    if desc.dimension != Dimension::D3 && size.width == size.height && size.depth_or_layers % 6 == 0
+    if desc.dimension != Dimension::D3
+        && size.width == size.height
+        && size.depth_or_layers.is_multiple_of(6)
     {
         return Err("copies from what OpenGL takes for a cube".to_owned());
     }
@@ -314,7 +316,7 @@ impl Checker<'_> {
         }
         let limits = self.gpu.raw_limits();
         let alignment = limits.min_uniform_buffer_offset_alignment.max(16);
-        if slice.offset % alignment != 0 {
+        if !slice.offset.is_multiple_of(alignment) {
             return Err(self.unsupported(format!(
                 "uniforms at byte {} (only multiples of {alignment}; plan with this device's limits)",
                 slice.offset
@@ -346,7 +348,9 @@ impl Checker<'_> {
                     return Err(self.unsupported("indirect dispatches"));
                 }
                 let bytes = self.buffer(*buffer)?;
-                if offset % 4 == 0 && offset.checked_add(12).is_some_and(|end| end <= bytes) {
+                if offset.is_multiple_of(4)
+                    && offset.checked_add(12).is_some_and(|end| end <= bytes)
+                {
                     Ok(())
                 } else {
                     Err(self.malformed("its arguments are outside of their buffer"))

@@ -10,6 +10,27 @@
 //!   [`WgpuBackend::new`] and use it through
 //!   [`Backend`](etalon_core::backend::Backend).
 //!
+//! ```no_run
+//! use etalon_core::backend::BackendError;
+//! use etalon_core::plan::Plan;
+//! use etalon_wgpu::{WgpuBackend, WgpuBindings, wgpu};
+//!
+//! /// Records a frame's effects; `plan` was made with `backend.limits()`.
+//! fn effects(
+//!     backend: &mut WgpuBackend,
+//!     plan: &Plan,
+//!     encoder: &mut wgpu::CommandEncoder,
+//!     colour: &wgpu::Texture,
+//!     target: &wgpu::Texture,
+//! ) -> Result<(), BackendError> {
+//!     let bindings = WgpuBindings::new()
+//!         .texture("colour", colour)
+//!         .output("image", target);
+//!     backend.record(encoder, plan, &bindings)?;
+//!     Ok(())
+//! }
+//! ```
+//!
 //! # What is kept between frames
 //! Pipelines are kept by kernel. Everything else a plan needs (transient
 //! textures by [slot](etalon_core::plan::Placement::slot), uniform buffers,

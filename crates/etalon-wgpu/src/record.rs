@@ -36,12 +36,10 @@ pub(crate) fn prepare_steps(
                     groups: count,
                 },
                 PreparedStep::Dispatch { pipeline, groups },
-            ) => {
-                if !empty(count) {
-                    groups.select(touched(bindings, physicals), || {
-                        context.group(&planned.name, &kernel.0, pipeline, bindings)
-                    })?;
-                }
+            ) if !empty(count) => {
+                groups.select(touched(bindings, physicals), || {
+                    context.group(&planned.name, &kernel.0, pipeline, bindings)
+                })?;
             }
             (
                 Step::ClearTexture {

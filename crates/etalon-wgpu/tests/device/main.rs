@@ -7,6 +7,8 @@
 
 mod common;
 mod engine;
+mod frames;
 mod kernels;
 mod refusals;
 mod transfers;
+mod views;

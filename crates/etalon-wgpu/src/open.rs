@@ -54,30 +54,35 @@ fn instance(backends: wgpu::Backends, validation: bool) -> wgpu::Instance {
     })
 }
 
-/// The adapters there are, best first.
+/// The adapters of an instance, best first.
 fn adapters(instance: &wgpu::Instance, backends: wgpu::Backends) -> Vec<wgpu::Adapter> {
     let mut adapters = pollster::block_on(instance.enumerate_adapters(backends));
     // Stable: equals stay in the order of the loader.
-    adapters.sort_by_key(|adapter| {
-        let info = adapter.get_info();
-        let api = u8::from(info.backend == wgpu::Backend::Gl);
-        let device = match info.device_type {
-            wgpu::DeviceType::DiscreteGpu => 0,
-            wgpu::DeviceType::IntegratedGpu => 1,
-            wgpu::DeviceType::VirtualGpu => 2,
-            wgpu::DeviceType::Other => 3,
-            wgpu::DeviceType::Cpu => 4,
-        };
-        (api, device)
+    adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
     });
     adapters
+}
+
+/// The APIs one by one, OpenGL last: what is not needed is not loaded.
+fn by_preference(backends: wgpu::Backends) -> impl Iterator<Item = wgpu::Backends> {
+    [
+        backends.difference(wgpu::Backends::GL),
+        backends.intersection(wgpu::Backends::GL),
+    ]
+    .into_iter()
+    .filter(|backends| !backends.is_empty())
 }
 
 /// The adapters of the given APIs, best first.
 #[must_use]
 pub fn enumerate(backends: wgpu::Backends) -> Vec<BackendInfo> {
-    adapters(&instance(backends, false), backends)
-        .iter()
+    by_preference(backends)
+        .flat_map(|backends| adapters(&instance(backends, false), backends))
         .map(|adapter| info_of(&adapter.get_info()))
         .collect()
 }
@@ -88,12 +93,6 @@ pub(crate) fn open(options: &WgpuOptions) -> Result<Gpu, BackendError> {
         backend: "wgpu",
         reason,
     };
-    let instance = instance(options.backends, options.validation);
-    let found = adapters(&instance, options.backends);
-    let names: Vec<String> = found
-        .iter()
-        .map(|adapter| info_of(&adapter.get_info()).to_string())
-        .collect();
     let matches = |adapter: &wgpu::Adapter| match &options.adapter {
         Some(wanted) => {
             let info = info_of(&adapter.get_info());
@@ -103,7 +102,18 @@ pub(crate) fn open(options: &WgpuOptions) -> Result<Gpu, BackendError> {
         }
         None => true,
     };
-    let Some(adapter) = found.into_iter().find(matches) else {
+    let mut names = Vec::new();
+    let found = by_preference(options.backends).find_map(|backends| {
+        let instance = instance(backends, options.validation);
+        let found = adapters(&instance, backends);
+        names.extend(
+            found
+                .iter()
+                .map(|adapter| info_of(&adapter.get_info()).to_string()),
+        );
+        found.into_iter().find(matches)
+    });
+    let Some(adapter) = found else {
         return Err(none(if names.is_empty() {
             format!(
                 "no adapter for {:?}; a Vulkan driver can be named in VK_DRIVER_FILES",

@@ -57,6 +57,12 @@ impl WgpuBackend {
     /// [`TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES`](wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES),
     /// and the adapter given, the adapter's own formats can be stored to.
     ///
+    /// Without its adapter the device is taken to have the texture formats that
+    /// WebGPU guarantees. Whether the workgroup counts of indirect dispatches are
+    /// held against the limits is up to the
+    /// [flags](wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL) of the engine's
+    /// instance.
+    ///
     /// The engine's error and device-loss callbacks stay the engine's: errors
     /// of the backend's own calls are caught in error scopes; that the device
     /// is lost is for the engine to notice.

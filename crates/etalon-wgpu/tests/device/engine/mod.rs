@@ -5,7 +5,7 @@ mod steady;
 
 use crate::common::{Route, copy_kernel, library, noise, open, plan, uints};
 use etalon_core::Format;
-use etalon_core::backend::BackendError;
+use etalon_core::backend::{Backend, BackendError};
 use etalon_core::graph::{ClearValue, Graph};
 use etalon_core::image::ImageData;
 use etalon_core::kernel::KernelLibrary;
@@ -231,6 +231,27 @@ fn a_plan_runs_in_the_engines_encoder_on_the_engines_textures() {
     assert_eq!(outputs.iter().count(), 1);
     engine.queue.submit([encoder.finish()]);
     assert_eq!(engine.read_row(&result, 0, 0), sums(&image, 1000));
+}
+
+#[test]
+fn a_device_is_adopted_without_its_adapter_too() {
+    let Some(engine) = Engine::new() else { return };
+    let mut backend = WgpuBackend::adopt(engine.device.clone(), engine.queue.clone(), None);
+    assert_eq!(backend.info(), engine.backend().info());
+    assert_eq!(backend.limits(), engine.backend().limits());
+    // Nothing beyond WebGPU was enabled.
+    assert!(!backend.keeps_strict_arithmetic());
+    assert!(!backend.limits().extended_storage_formats);
+    let plan = add(&backend, &adder(), 3);
+    let image = row(9);
+    let (source, result) = (engine.filled(&image), engine.texture((64, 1, 1), 1, OUTPUT));
+    let mut encoder = engine.encoder();
+    let bindings = WgpuBindings::new()
+        .texture("row", &source)
+        .output("sum", &result);
+    backend.record(&mut encoder, &plan, &bindings).unwrap();
+    engine.queue.submit([encoder.finish()]);
+    assert_eq!(engine.read_row(&result, 0, 0), sums(&image, 3));
 }
 
 #[test]

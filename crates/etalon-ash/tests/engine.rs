@@ -191,67 +191,72 @@ fn outputs_can_be_the_backends_own() {
     });
 }
 
+/// Runs frames with so many in flight, on images that take turns.
+fn overlap(engine: &Engine, frames_in_flight: u32, images: usize) {
+    let options = AshOptions {
+        frames_in_flight,
+        ..AshOptions::default()
+    };
+    let mut backend = adopt(engine, options);
+    let inputs: Vec<_> = (0..images)
+        .map(|_| {
+            engine.image(
+                DESC,
+                vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+            )
+        })
+        .collect();
+    let sources: Vec<_> = inputs
+        .iter()
+        // SAFETY: as described, and dropped before the engine.
+        .map(|image| unsafe { backend.adopt_texture(image.adopted()) }.unwrap())
+        .collect();
+    let frames: u32 = 20;
+    let seen: Vec<EngineBuffer> = (0..frames).map(|_| engine.buffer(bytes(DESC))).collect();
+    let mut under_way = VecDeque::new();
+    let mut counters = Vec::new();
+    for frame in 0..frames {
+        if under_way.len() == frames_in_flight as usize {
+            engine.wait(under_way.pop_front().unwrap());
+        }
+        let turn = frame as usize % images;
+        let plan = common::plan(&backend, &accumulate(frame as f32), Capture::None);
+        let commands = engine.begin();
+        engine.fill(commands, &inputs[turn], 100.0 * turn as f32);
+        let bindings = AshBindings::new()
+            .texture_in("source", &sources[turn], CLEARED, TextureState::REST)
+            .output_in("result", COPIED);
+        // SAFETY: no more than the promised number are under way.
+        let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+        let image = outputs.textures["result"].image;
+        engine.download(commands, image, DESC, &seen[frame as usize]);
+        under_way.push_back(engine.submit(commands));
+        counters.push(backend.counters());
+    }
+    for fence in under_way {
+        engine.wait(fence);
+    }
+    let mut total = 0.0;
+    for (frame, seen) in seen.iter().enumerate() {
+        total += (100 * (frame % images) + frame) as f32;
+        assert_eq!(engine.floats(seen), vec![total; 240], "frame {frame}");
+    }
+    // By now each side of the history has met enough of the images.
+    let (warm, last) = (counters[10], counters[19]);
+    assert_eq!(warm.allocations, last.allocations);
+    assert_eq!(warm.bytes, last.bytes);
+    assert_eq!(warm.pipelines, last.pipelines);
+    assert_eq!(warm.bind_groups, last.bind_groups);
+    assert_eq!((warm.textures, warm.buffers), (last.textures, last.buffers));
+    assert_eq!(last.dispatches - warm.dispatches, 27);
+}
+
 #[test]
 fn frames_in_flight_do_not_disturb_each_other() {
     on_each(|engine| {
-        let frames_in_flight = 3;
-        let options = AshOptions {
-            frames_in_flight,
-            ..AshOptions::default()
-        };
-        let mut backend = adopt(engine, options);
-        // The engine takes turns with two images.
-        let inputs: Vec<_> = (0..2)
-            .map(|_| {
-                engine.image(
-                    DESC,
-                    vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
-                )
-            })
-            .collect();
-        let sources: Vec<_> = inputs
-            .iter()
-            // SAFETY: as described, and dropped before the engine.
-            .map(|image| unsafe { backend.adopt_texture(image.adopted()) }.unwrap())
-            .collect();
-        let frames: u32 = 12;
-        let seen: Vec<EngineBuffer> = (0..frames).map(|_| engine.buffer(bytes(DESC))).collect();
-        let mut under_way = VecDeque::new();
-        let mut counters = Vec::new();
-        for frame in 0..frames {
-            if under_way.len() == frames_in_flight as usize {
-                engine.wait(under_way.pop_front().unwrap());
-            }
-            let turn = frame as usize % 2;
-            let plan = common::plan(&backend, &accumulate(frame as f32), Capture::None);
-            let commands = engine.begin();
-            engine.fill(commands, &inputs[turn], 100.0);
-            let bindings = AshBindings::new()
-                .texture_in("source", &sources[turn], CLEARED, TextureState::REST)
-                .output_in("result", COPIED);
-            // SAFETY: no more than the promised number are under way.
-            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
-            let image = outputs.textures["result"].image;
-            engine.download(commands, image, DESC, &seen[frame as usize]);
-            under_way.push_back(engine.submit(commands));
-            counters.push(backend.counters());
-        }
-        for fence in under_way {
-            engine.wait(fence);
-        }
-        let mut total = 0.0;
-        for (frame, seen) in seen.iter().enumerate() {
-            total += 100.0 + frame as f32;
-            assert_eq!(engine.floats(seen), vec![total; 240], "frame {frame}");
-        }
-        // Two images in turn with the two sides of the history.
-        let (warm, last) = (counters[3], counters[frames as usize - 1]);
-        assert_eq!(warm.allocations, last.allocations);
-        assert_eq!(warm.bytes, last.bytes);
-        assert_eq!(warm.pipelines, last.pipelines);
-        assert_eq!(warm.bind_groups, last.bind_groups);
-        assert_eq!((warm.textures, warm.buffers), (last.textures, last.buffers));
-        assert_eq!(last.dispatches - warm.dispatches, 3 * u64::from(frames - 4));
+        overlap(engine, 3, 2);
+        // More choices of resources than descriptor sets are kept for.
+        overlap(engine, 6, 7);
     });
 }
 
@@ -296,6 +301,68 @@ fn frames_wait_for_those_before() {
             assert_eq!(engine.floats(&seen[0]), vec![1.0; 240]);
             assert_eq!(engine.floats(&seen[1]), vec![3.0; 240]);
         }
+    });
+}
+
+/// A transient with memory of its own waits for its own last use in the frame
+/// before, which the plan's barriers do not name.
+#[test]
+fn transients_apart_wait_for_themselves() {
+    on_each(|engine| {
+        let mut backend = adopt(engine, AshOptions::default());
+        let mut graph = Graph::new();
+        let mut newest = graph.import_texture("source", DESC).unwrap();
+        for _ in 0..3 {
+            let result = graph.texture("link", DESC);
+            newest = graph
+                .compute("test/add")
+                .read("source", newest)
+                .write("result", result)
+                .set("offset", 1.0_f32)
+                .per_texel("result")
+                .unwrap();
+        }
+        let result = graph.texture("result", DESC);
+        let result = graph.copy(newest, result).unwrap();
+        graph.output("result", result).unwrap();
+        let mut plan = common::plan(&backend, &graph, Capture::None);
+        assert!(
+            plan.texture_heap < plan.unaliased_bytes,
+            "one shares memory"
+        );
+        // As if planned for a device without alignments.
+        plan.heap_alignment = 1;
+        let input = engine.image(
+            DESC,
+            vk::ImageUsageFlags::SAMPLED | vk::ImageUsageFlags::TRANSFER_DST,
+        );
+        // SAFETY: as described, and dropped before the engine.
+        let source = unsafe { backend.adopt_texture(input.adopted()) }.unwrap();
+        let seen = engine.buffer(bytes(DESC));
+        let commands = engine.begin();
+        engine.fill(commands, &input, 1.0);
+        let before = backend.counters().allocations;
+        for arrives in [CLEARED, TextureState::REST] {
+            let bindings =
+                AshBindings::new().texture_in("source", &source, arrives, TextureState::REST);
+            // SAFETY: as in the other tests.
+            let outputs = unsafe { backend.record(commands, &plan, &bindings) }.unwrap();
+            if arrives == TextureState::REST {
+                let left = outputs.textures["result"];
+                engine.barrier(
+                    commands,
+                    left.image,
+                    (left.state.layout, COPIED.layout),
+                    (left.state.stages, left.state.access),
+                    (COPIED.stages, COPIED.access),
+                );
+                engine.download(commands, left.image, DESC, &seen);
+            }
+        }
+        // Three transients, an output and uniforms, none of them shared.
+        assert_eq!(backend.counters().allocations - before, 5);
+        engine.wait(engine.submit(commands));
+        assert_eq!(engine.floats(&seen), vec![4.0; 240]);
     });
 }
 

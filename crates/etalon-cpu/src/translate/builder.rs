@@ -29,6 +29,8 @@ struct Level {
     nodes: Vec<Node>,
     numbering: Numbering,
     assigned: BTreeSet<Variable>,
+    /// What was known of the variables at the start.
+    before: Vec<Option<Value>>,
 }
 
 /// A finished level.
@@ -36,6 +38,8 @@ pub(super) struct Branch {
     pub(super) nodes: Vec<Node>,
     numbering: Numbering,
     assigned: BTreeSet<Variable>,
+    /// What was known of the variables at the start.
+    before: Vec<Option<Value>>,
     /// What was known of the variables at the end.
     known: Vec<Option<Value>>,
     /// Whether the end can be reached.
@@ -282,14 +286,15 @@ impl Builder {
 
     /// Starts building nodes apart from the current ones.
     pub(super) fn begin(&mut self) {
-        self.levels.push(Level::default());
+        let before = self.known.clone();
+        self.levels.push(Level { before, ..Level::default() });
     }
 
     /// Ends what [`Builder::begin`] started. What is known of the variables
     /// stays as it is at the end.
     pub(super) fn end(&mut self, falls_through: bool) -> Branch {
         let level = self.levels.pop().unwrap_or_default();
-        Branch { nodes: level.nodes, numbering: level.numbering, assigned: level.assigned, known: self.known.clone(), falls_through }
+        Branch { nodes: level.nodes, numbering: level.numbering, assigned: level.assigned, before: level.before, known: self.known.clone(), falls_through }
     }
 
     /// What is known of the variables, for [`Builder::restore`].
@@ -366,6 +371,7 @@ impl Builder {
         self.note_assigned(&branch.assigned);
         if self.left.contains(&id) {
             // Some lanes may have skipped any part of it.
+            self.restore(&branch.before);
             self.forget(branch.assigned.iter().copied());
             self.push(Node::Scope { id, body: branch.nodes });
         } else {
@@ -380,24 +386,25 @@ impl Builder {
         self.left.contains(&id)
     }
 
+    /// Between the body of a loop and what every iteration ends with: unless some
+    /// lanes may have skipped parts of the body, all of it is known.
+    pub(super) fn after_body(&mut self, next: ScopeId, body: &Branch) {
+        if self.left.contains(&next) {
+            self.restore(&body.before);
+            self.forget(body.assigned.iter().copied());
+        } else {
+            self.level().numbering.extend(body.numbering.iter().map(|(key, values)| (key.clone(), values.clone())));
+        }
+    }
+
     /// Appends a loop.
     pub(super) fn finish_loop(&mut self, id: ScopeId, next: ScopeId, body: Branch, continuing: Branch, break_if: Option<Value>) {
         self.note_assigned(&body.assigned);
         self.note_assigned(&continuing.assigned);
+        self.restore(&body.before);
         self.forget(body.assigned.iter().chain(&continuing.assigned).copied());
         let span = self.span;
         self.push(Node::Loop { id, next, body: body.nodes, continuing: continuing.nodes, break_if, span });
-    }
-
-    /// Makes what `branch` computed known to what follows in the same loop iteration.
-    pub(super) fn adopt_numbering(&mut self, branch: &Branch) {
-        self.level().numbering.extend(branch.numbering.iter().map(|(k, v)| (k.clone(), v.clone())));
-    }
-}
-
-impl Branch {
-    pub(super) fn assigned(&self) -> impl Iterator<Item = Variable> + '_ {
-        self.assigned.iter().copied()
     }
 }
 

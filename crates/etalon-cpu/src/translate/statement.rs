@@ -235,11 +235,7 @@ impl<'a> Translator<'a> {
         frame.breaks.pop();
         frame.continues.pop();
         self.builder.begin();
-        if self.builder.is_left(next) {
-            self.builder.forget(body.assigned().collect::<Vec<_>>());
-        } else {
-            self.builder.adopt_numbering(&body);
-        }
+        self.builder.after_body(next, &body);
         // `break` is not allowed here.
         let reached = self.block(frame, Sequence::of(continuing), &[])?;
         let break_if = break_if.map(|condition| self.scalar(frame, condition)).transpose()?;

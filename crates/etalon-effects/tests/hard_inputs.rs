@@ -1,0 +1,103 @@
+//! Whatever the inputs hold, every pass of every effect writes numbers.
+
+mod common;
+
+use common::{Run, backend, texels};
+use etalon_core::backend::CapturedData;
+use etalon_core::kernel::Arithmetic;
+use etalon_core::plan::Capture;
+use etalon_effects::composite::{Composite, Output, ToneCurve};
+use etalon_effects::{CameraParams, ChainSettings, DepthRange, SceneInputs, chain};
+use etalon_scenes::{Frame, FrameSize, scene};
+use glam::Vec2;
+
+fn import<'a>(run: &mut Run<'a>, frame: &'a Frame) -> SceneInputs {
+    SceneInputs {
+        colour: run.import("colour", &frame.colour),
+        depth: run.import("depth", &frame.depth),
+        normal: run.import("normal", &frame.normal),
+        specular: run.import("specular", &frame.specular),
+        velocity: None,
+        camera: CameraParams {
+            scale: frame.camera.projection.scale().as_vec2(),
+            centre: Vec2::ZERO,
+            near: frame.camera.projection.near() as f32,
+            depth: DepthRange::ReversedInfinite,
+        },
+        delta_time: 1.0 / 60.0,
+    }
+}
+
+/// Runs the chain on a scene for some frames and checks every pass's result.
+fn check(name: &str, width: u32, height: u32, settings: &ChainSettings, arithmetic: Arithmetic) {
+    let entry = scene(name).expect("registered");
+    let frame = entry
+        .frame(FrameSize::new(width, height).expect("small"))
+        .expect("small");
+    let mut backend = backend();
+    for _ in 0..2 {
+        let mut run = Run::new();
+        run.arithmetic = arithmetic;
+        let inputs = import(&mut run, &frame);
+        let result = chain(&mut run.graph, &inputs, settings).expect("valid settings");
+        run.graph
+            .output("picture", result.picture)
+            .expect("written");
+        let execution = run.execute(backend.as_mut(), Capture::EveryPass);
+        assert!(execution.captures.len() > 5);
+        for captured in &execution.captures {
+            let CapturedData::Texture(image) = &captured.data else {
+                continue;
+            };
+            for (index, texel) in texels(image).iter().enumerate() {
+                let numbers = texel.iter().all(|channel| channel.is_finite());
+                assert!(
+                    numbers,
+                    "{name}, {}, texel {index}: {texel:?}",
+                    captured.pass
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn every_pass_writes_numbers_from_hard_inputs() {
+    for (width, height) in [(1, 1), (1, 40), (40, 1), (33, 17), (96, 54)] {
+        for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {
+            check(
+                "hard-inputs",
+                width,
+                height,
+                &ChainSettings::full(),
+                arithmetic,
+            );
+        }
+    }
+}
+
+#[test]
+fn every_curve_and_output_takes_hard_inputs() {
+    let outputs = ToneCurve::ALL
+        .map(Output::Sdr)
+        .into_iter()
+        .chain([Output::Hdr]);
+    for output in outputs {
+        let composite = Composite {
+            output,
+            ..Composite::default()
+        };
+        let settings = ChainSettings {
+            composite,
+            ..ChainSettings::full()
+        };
+        check("hard-inputs", 48, 27, &settings, Arithmetic::Strict);
+    }
+}
+
+#[test]
+fn ordinary_scenes_stay_numbers_too() {
+    for name in ["wet-floor", "corridor-grazing", "dark-room-lights"] {
+        check(name, 64, 36, &ChainSettings::full(), Arithmetic::Strict);
+    }
+}

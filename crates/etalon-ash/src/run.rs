@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use etalon_core::backend::BackendError;
-use etalon_core::plan::{Barrier, Bound, Groups, Plan, Step};
+use etalon_core::plan::{Barrier, Bound, Groups, Plan, Step, UsageSet};
 
 use crate::buffer::Buffer;
 use crate::commands::{Barriers, Commands, Transition};
@@ -138,30 +138,14 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// What a barrier is in Vulkan.
     fn transition(&self, barrier: &Barrier) -> Transition {
-        let mut from = barrier.from;
         let index = usize::try_from(barrier.resource).unwrap_or(usize::MAX);
-        // The first use of a transient: the plan names the uses of those that
-        // had its memory before. One with memory of its own had it before
-        // itself, in the run before. (An empty set waits for everything.)
-        if barrier.layout.is_none()
-            && !from.is_empty()
-            && self.apart.get(index).is_some_and(|apart| *apart)
-            && let Some(resource) = self.plan.resources.get(index)
-        {
-            from = from.union(resource.usages);
-        }
-        let to = usage::row(barrier.to);
-        Transition {
-            source: usage::source(from),
-            target: (to.stages, to.access),
-            layouts: (
-                barrier.layout.map_or(vk::ImageLayout::UNDEFINED, |layout| {
-                    usage::row(layout).layout
-                }),
-                to.layout,
-            ),
-        }
+        let own_uses = match (self.apart.get(index), self.plan.resources.get(index)) {
+            (Some(true), Some(resource)) => resource.usages,
+            _ => UsageSet::EMPTY,
+        };
+        transition(barrier, own_uses)
     }
 
     /// Does what a step does.
@@ -255,5 +239,68 @@ impl Run<'_> {
             // Each capture was given a place when the plan was prepared.
             _ => Err(malformed(format!("capture {index} has no place to go"))),
         }
+    }
+}
+
+/// What a barrier is in Vulkan. `own_uses` are the uses of a transient that has
+/// memory of its own: the plan says what to wait for before its first use by
+/// naming the uses of those that had its memory before, which here was itself,
+/// in the run before. (An empty set waits for everything.)
+fn transition(barrier: &Barrier, own_uses: UsageSet) -> Transition {
+    let first_use = barrier.layout.is_none() && !barrier.from.is_empty();
+    let from = if first_use {
+        barrier.from.union(own_uses)
+    } else {
+        barrier.from
+    };
+    let to = usage::row(barrier.to);
+    let old = barrier.layout.map(|layout| usage::row(layout).layout);
+    Transition {
+        source: usage::source(from),
+        target: (to.stages, to.access),
+        layouts: (old.unwrap_or(vk::ImageLayout::UNDEFINED), to.layout),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use etalon_core::graph::Subresources;
+    use etalon_core::plan::Usage;
+
+    use super::*;
+
+    fn barrier(from: UsageSet, layout: Option<Usage>) -> Barrier {
+        Barrier {
+            resource: 0,
+            range: Subresources::ALL,
+            from,
+            layout,
+            to: Usage::CopyTarget,
+        }
+    }
+
+    #[test]
+    fn contents_are_kept_where_the_plan_keeps_them() {
+        let kept = barrier(Usage::StorageWrite.into(), Some(Usage::StorageWrite));
+        let by = transition(&kept, UsageSet::EMPTY);
+        let target = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        assert_eq!(by.layouts, (vk::ImageLayout::GENERAL, target));
+        assert_eq!(by.source, usage::source(Usage::StorageWrite.into()));
+        let lost = barrier(Usage::StorageWrite.into(), None);
+        let by = transition(&lost, UsageSet::EMPTY);
+        assert_eq!(by.layouts, (vk::ImageLayout::UNDEFINED, target));
+    }
+
+    #[test]
+    fn transients_apart_wait_for_their_own_uses_too() {
+        let own: UsageSet = Usage::CopySource.into();
+        let former: UsageSet = Usage::Sampled.into();
+        let first = transition(&barrier(former, None), own);
+        assert_eq!(first.source, usage::source(former.union(own)));
+        // Everything is enough, and later uses are the plan's business.
+        let all = transition(&barrier(UsageSet::EMPTY, None), own);
+        assert_eq!(all.source, usage::source(UsageSet::EMPTY));
+        let later = transition(&barrier(former, Some(Usage::Sampled)), own);
+        assert_eq!(later.source, usage::source(former));
     }
 }

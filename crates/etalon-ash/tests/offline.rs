@@ -28,14 +28,14 @@ fn words(execution: &Execution, output: &str) -> Vec<u32> {
         .collect()
 }
 
-/// `passes` additions of 1, one after the other.
-fn chain(desc: TextureDesc, passes: u32) -> Result<Graph, GraphError> {
+/// `passes` runs of a kernel that adds 1, one after the other.
+fn chain_of(kernel: &'static str, desc: TextureDesc, passes: u32) -> Result<Graph, GraphError> {
     let mut graph = Graph::new();
     let mut newest = graph.import_texture("source", desc)?;
     for pass in 0..passes {
         let result = graph.texture(format!("link {pass}"), desc);
         newest = graph
-            .compute("test/add")
+            .compute(kernel)
             .read("source", newest)
             .write("result", result)
             .set("offset", 1.0_f32)
@@ -43,6 +43,11 @@ fn chain(desc: TextureDesc, passes: u32) -> Result<Graph, GraphError> {
     }
     graph.output("result", newest)?;
     Ok(graph)
+}
+
+/// `passes` additions of 1, one after the other.
+fn chain(desc: TextureDesc, passes: u32) -> Result<Graph, GraphError> {
+    chain_of("test/add", desc, passes)
 }
 
 #[test]
@@ -64,8 +69,9 @@ fn texels_come_out_as_they_went_in_at_any_size() {
 #[test]
 fn transients_that_share_memory_do_not_disturb_each_other() {
     on_each(|backend| {
-        let source = image(61, 47, |x, y| (x * y) as f32);
-        let graph = chain(source.desc, 12).unwrap();
+        let source = image(61, 47, |x, y| (x * x + y) as f32);
+        // Each pass reads where others write.
+        let graph = chain_of("test/turn", source.desc, 12).unwrap();
         let plan = plan(backend, &graph, Capture::EveryPass);
         assert!(
             plan.texture_heap < plan.unaliased_bytes,
@@ -77,12 +83,12 @@ fn transients_that_share_memory_do_not_disturb_each_other() {
         for _ in 0..2 {
             let execution = backend.execute(&plan, &inputs).unwrap();
             assert_eq!(execution.captures.len(), 12);
-            for (pass, captured) in execution.captures.iter().enumerate() {
+            let mut expected = reds(&source);
+            for captured in &execution.captures {
                 let CapturedData::Texture(result) = &captured.data else {
                     panic!("no texture");
                 };
-                let offset = (pass + 1) as f32;
-                let expected: Vec<f32> = reds(&source).iter().map(|v| v + offset).collect();
+                expected = expected.iter().rev().map(|v| v + 1.0).collect();
                 assert_eq!(reds(result), expected, "{}", captured.pass);
             }
         }

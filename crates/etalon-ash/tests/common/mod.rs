@@ -161,6 +161,21 @@ const KERNELS: &[(&str, &str)] = &[
              textureStore(result, id.xy, vec4<f32>(value, 0.0, 0.0, 1.0));
          }",
     ),
+    // As test/add, of the texel opposite.
+    (
+        "test/turn",
+        "struct Params { offset: f32 }
+         @group(0) @binding(0) var source: texture_2d<f32>;
+         @group(0) @binding(1) var result: texture_storage_2d<r32float, write>;
+         @group(0) @binding(2) var<uniform> params: Params;
+         @compute @workgroup_size(8, 8)
+         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+             let size = textureDimensions(result);
+             if (id.x >= size.x || id.y >= size.y) { return; }
+             let value = textureLoad(source, size - 1u - id.xy, 0).x + params.offset;
+             textureStore(result, id.xy, vec4<f32>(value, 0.0, 0.0, 1.0));
+         }",
+    ),
     // result = first + second
     (
         "test/sum_of",

@@ -15,7 +15,7 @@ fn unsupported_constructs_are_named_and_placed() {
         (format!("{texture}\n{main}_ = textureSampleLevel(t, s, vec2<f32>(0.5), 0.0, vec2<i32>(1, 0));\n}}"), "offset", 3),
         (format!("var<private> a: f64;\n{main}a = 1.0lf;\n}}"), "64-bit", 1),
         (format!("@group(0) @binding(0) var t: texture_multisampled_2d<f32>;\n{main}_ = textureLoad(t, vec2<i32>(0), 0);\n}}"), "multisampled", 1),
-        (format!("@group(0) @binding(0) var t: texture_depth_2d; @group(0) @binding(1)\nvar s: sampler_comparison;\n{main}_ = textureSampleCompareLevel(t, s, vec2<f32>(0.5), 0.5);\n}}"), "comparison", 1),
+        (format!("@group(0) @binding(0) var t: texture_depth_2d; @group(0) @binding(1)\nvar s: sampler_comparison;\n{main}_ = textureSampleCompareLevel(t, s, vec2<f32>(0.5), 0.5);\n}}"), "comparison", 2),
     ];
     for (wgsl, construct, line) in cases {
         match translate(&wgsl) {

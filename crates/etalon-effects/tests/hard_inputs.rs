@@ -7,26 +7,8 @@ use etalon_core::backend::CapturedData;
 use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::Capture;
 use etalon_effects::composite::{Composite, Output, ToneCurve};
-use etalon_effects::{CameraParams, ChainSettings, DepthRange, SceneInputs, chain};
-use etalon_scenes::{Frame, FrameSize, scene};
-use glam::Vec2;
-
-fn import<'a>(run: &mut Run<'a>, frame: &'a Frame) -> SceneInputs {
-    SceneInputs {
-        colour: run.import("colour", &frame.colour),
-        depth: run.import("depth", &frame.depth),
-        normal: run.import("normal", &frame.normal),
-        specular: run.import("specular", &frame.specular),
-        velocity: None,
-        camera: CameraParams {
-            scale: frame.camera.projection.scale().as_vec2(),
-            centre: Vec2::ZERO,
-            near: frame.camera.projection.near() as f32,
-            depth: DepthRange::ReversedInfinite,
-        },
-        delta_time: 1.0 / 60.0,
-    }
-}
+use etalon_effects::{ChainSettings, chain};
+use etalon_scenes::{FrameSize, scene};
 
 /// Runs the chain on a scene for some frames and checks every pass's result.
 fn check(name: &str, width: u32, height: u32, settings: &ChainSettings, arithmetic: Arithmetic) {
@@ -38,7 +20,7 @@ fn check(name: &str, width: u32, height: u32, settings: &ChainSettings, arithmet
     for _ in 0..2 {
         let mut run = Run::new();
         run.arithmetic = arithmetic;
-        let inputs = import(&mut run, &frame);
+        let inputs = run.import_frame(&frame);
         let result = chain(&mut run.graph, &inputs, settings).expect("valid settings");
         run.graph
             .output("picture", result.picture)

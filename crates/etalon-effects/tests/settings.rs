@@ -8,7 +8,7 @@ use etalon_effects::ssr::Ssr;
 use etalon_effects::{CameraParams, ChainSettings, DepthRange, SettingError};
 
 /// One field: how to set it, its name, and its range.
-type Field<S> = (fn(&mut S, f32), &'static str, f32, f32);
+type Field<S, V = f32> = (fn(&mut S, V), &'static str, V, V);
 
 /// Both ends of each range are accepted; what lies beyond them, NaN and
 /// infinities are refused with the field's name and range.
@@ -55,7 +55,7 @@ fn ssr() {
         (|s, v| s.border = v, "border", 0.0, 0.5),
     ];
     check(Ssr::default(), &fields, Ssr::validate);
-    let counts: [(fn(&mut Ssr, u32), &str, u32, u32); 3] = [
+    let counts: [Field<Ssr, u32>; 3] = [
         (|s, v| s.steps = v, "steps", 0, 24),
         (|s, v| s.march_limit = v, "march_limit", 1, 23_171),
         (|s, v| s.blur_radius = v, "blur_radius", 0, 64),

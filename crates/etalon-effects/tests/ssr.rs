@@ -234,7 +234,8 @@ fn every_fade_takes_away_and_stays_in_range() {
     let run = |settings: &Ssr| marched(&frame.depth, &frame.normal, &camera, settings);
     let plain = run(&PLAIN);
     assert!(plain.iter().all(|texel| texel[2] == 0.0 || texel[2] == 1.0));
-    let fades: [(&str, fn(f32) -> Ssr); 4] = [
+    type Fade = (&'static str, fn(f32) -> Ssr);
+    let fades: [Fade; 4] = [
         ("camera", |s| Ssr {
             camera_fade: s,
             ..PLAIN

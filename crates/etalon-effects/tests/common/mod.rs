@@ -9,6 +9,8 @@ use etalon_core::image::ImageData;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanOptions};
 use etalon_core::resource::TextureDesc;
+use etalon_effects::SceneInputs;
+use etalon_scenes::Frame;
 
 /// The executor of these tests.
 pub(crate) fn backend() -> Box<dyn Backend> {
@@ -57,6 +59,14 @@ impl<'a> Run<'a> {
         self.inputs = std::mem::take(&mut self.inputs).texture(name, image);
         self.graph
             .import_texture(name, image.desc)
+            .expect("each name once")
+    }
+
+    /// Imports the images of a frame, a sixtieth of a second after the last.
+    pub(crate) fn import_frame(&mut self, frame: &'a Frame) -> SceneInputs {
+        self.inputs = frame.inputs();
+        frame
+            .import(&mut self.graph, 1.0 / 60.0)
             .expect("each name once")
     }
 

@@ -235,8 +235,15 @@ const fn kind(kind: vk::PhysicalDeviceType) -> DeviceKind {
 /// Every physical device of an instance.
 fn all(instance: &Instance) -> Result<Vec<Physical>, BackendError> {
     // SAFETY: no preconditions beyond a live instance.
-    let handles = unsafe { instance.raw.enumerate_physical_devices() }
-        .map_err(failed("vkEnumeratePhysicalDevices"))?;
+    let handles = unsafe { instance.raw.enumerate_physical_devices() }.map_err(|result| {
+        match result {
+            // What the loader answers when no driver found hardware of its own.
+            ash::vk::Result::ERROR_INITIALIZATION_FAILED => {
+                no_device("the Vulkan drivers there are found no hardware of theirs")
+            }
+            other => failed("vkEnumeratePhysicalDevices")(other),
+        }
+    })?;
     Ok(handles
         .into_iter()
         .map(|handle| Physical::query(instance, handle))

@@ -2,9 +2,11 @@
 
 use std::fmt;
 
+use etalon_core::Format;
+use etalon_core::format::Encoding;
 use etalon_core::image::{ImageData, TexelPosition};
 use etalon_core::resource::TextureDesc;
-use etalon_core::texel::INFINITE_ULPS;
+use etalon_core::texel::{INFINITE_ULPS, TexelCodes};
 use serde::{Serialize, Serializer};
 use thiserror::Error;
 
@@ -153,55 +155,9 @@ pub fn compare(reference: &ImageData, subject: &ImageData) -> Result<Comparison,
     check(reference, subject)?;
     let format = reference.desc.format;
     let mut totals = Totals::default();
-    for_each_texel(
-        reference,
-        subject,
-        |position, bytes_reference, bytes_subject| {
-            let (a, b) = (format.codes(bytes_reference), format.codes(bytes_subject));
-            let channels = format.channels() as usize;
-            let non_finite = |codes: etalon_core::texel::TexelCodes| {
-                (0..channels).any(|channel| format.is_non_finite(channel, codes.channels[channel]))
-            };
-            totals.texels += 1;
-            totals.non_finite_reference += u64::from(non_finite(a));
-            totals.non_finite_subject += u64::from(non_finite(b));
-            if bytes_reference == bytes_subject {
-                return;
-            }
-            let distances = format.ulps(a, b);
-            if distances == [0; 4] {
-                return;
-            }
-            totals.differing += 1;
-            let values = (
-                format.decode_codes(a).to_f64(),
-                format.decode_codes(b).to_f64(),
-            );
-            for (channel, &distance) in distances
-                .iter()
-                .enumerate()
-                .filter(|&(_, &distance)| distance > 0)
-            {
-                let ulps = Ulps(distance);
-                let (reference, subject) = (values.0[channel], values.1[channel]);
-                if ulps == Ulps::INFINITE {
-                    totals.max_abs = f64::INFINITY;
-                } else {
-                    totals.sum += u128::from(distance);
-                    totals.max_abs = totals.max_abs.max((reference - subject).abs());
-                }
-                if totals.worst.is_none_or(|worst| ulps > worst.ulps) {
-                    totals.worst = Some(WorstTexel {
-                        position,
-                        channel,
-                        reference,
-                        subject,
-                        ulps,
-                    });
-                }
-            }
-        },
-    );
+    for_each_texel(reference, subject, |position, reference, subject| {
+        totals.add(format, position, reference, subject);
+    });
     let values = totals
         .texels
         .saturating_mul(format.channels().into())
@@ -221,15 +177,37 @@ pub fn compare(reference: &ImageData, subject: &ImageData) -> Result<Comparison,
     })
 }
 
-/// Counts the texels for which `beyond` holds in any channel, given the
-/// distance in ULPs and the difference of the values.
+/// One channel of one texel in which two images differ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// The distance, above 0.
+    pub ulps: Ulps,
+    /// The reference's decoded value.
+    pub reference: f64,
+    /// The decoded value under test.
+    pub subject: f64,
+}
+
+impl Difference {
+    /// The absolute difference of the values; infinite where that of the codes is.
+    #[must_use]
+    pub fn absolute(&self) -> f64 {
+        if self.ulps == Ulps::INFINITE {
+            f64::INFINITY
+        } else {
+            (self.reference - self.subject).abs()
+        }
+    }
+}
+
+/// Counts the texels for which `condition` holds in any channel that differs.
 ///
 /// # Errors
 /// As of [`compare`].
-pub fn texels_beyond(
+pub fn texels_with(
     reference: &ImageData,
     subject: &ImageData,
-    beyond: impl Fn(Ulps, f64) -> bool,
+    condition: impl Fn(&Difference) -> bool,
 ) -> Result<u64, CompareError> {
     check(reference, subject)?;
     let format = reference.desc.format;
@@ -244,16 +222,16 @@ pub fn texels_beyond(
             format.decode_codes(a).to_f64(),
             format.decode_codes(b).to_f64(),
         );
-        let is_beyond = |channel: usize| {
+        let holds = |channel: usize| {
             let ulps = Ulps(distances[channel]);
-            let difference = if ulps == Ulps::INFINITE {
-                f64::INFINITY
-            } else {
-                (values.0[channel] - values.1[channel]).abs()
+            let difference = Difference {
+                ulps,
+                reference: values.0[channel],
+                subject: values.1[channel],
             };
-            ulps > Ulps(0) && beyond(ulps, difference)
+            ulps > Ulps(0) && condition(&difference)
         };
-        count += u64::from((0..format.channels() as usize).any(is_beyond));
+        count += u64::from((0..format.channels() as usize).any(holds));
     });
     Ok(count)
 }
@@ -268,6 +246,66 @@ struct Totals {
     worst: Option<WorstTexel>,
     non_finite_reference: u64,
     non_finite_subject: u64,
+}
+
+impl Totals {
+    /// Adds the same texel of both images.
+    fn add(&mut self, format: Format, position: TexelPosition, reference: &[u8], subject: &[u8]) {
+        self.texels += 1;
+        let same = reference == subject;
+        // Other encodings have no non-finite codes to look for.
+        let can_be_non_finite = matches!(format.encoding(), Encoding::Float | Encoding::Ufloat);
+        if same && !can_be_non_finite {
+            return;
+        }
+        let (a, b) = (format.codes(reference), format.codes(subject));
+        let non_finite = |codes: TexelCodes| {
+            let mut channels = 0..format.channels() as usize;
+            channels.any(|channel| format.is_non_finite(channel, codes.channels[channel]))
+        };
+        if can_be_non_finite {
+            self.non_finite_reference += u64::from(non_finite(a));
+            self.non_finite_subject += u64::from(non_finite(b));
+        }
+        let distances = if same { [0; 4] } else { format.ulps(a, b) };
+        if distances == [0; 4] {
+            return;
+        }
+        self.differing += 1;
+        let (a, b) = (
+            format.decode_codes(a).to_f64(),
+            format.decode_codes(b).to_f64(),
+        );
+        for (channel, &distance) in distances
+            .iter()
+            .enumerate()
+            .filter(|&(_, &distance)| distance > 0)
+        {
+            let difference = Difference {
+                ulps: Ulps(distance),
+                reference: a[channel],
+                subject: b[channel],
+            };
+            let Difference {
+                ulps,
+                reference,
+                subject,
+            } = difference;
+            if ulps != Ulps::INFINITE {
+                self.sum += u128::from(distance);
+            }
+            self.max_abs = self.max_abs.max(difference.absolute());
+            if self.worst.is_none_or(|worst| ulps > worst.ulps) {
+                self.worst = Some(WorstTexel {
+                    position,
+                    channel,
+                    reference,
+                    subject,
+                    ulps,
+                });
+            }
+        }
+    }
 }
 
 /// Whether the images can be compared texel by texel.

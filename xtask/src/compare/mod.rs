@@ -12,7 +12,9 @@ mod tests;
 mod tolerance;
 mod view;
 
-pub use figures::{CompareError, Comparison, Ulps, WorstTexel, compare, describe, texels_beyond};
+pub use figures::{
+    CompareError, Comparison, Difference, Ulps, WorstTexel, compare, describe, texels_with,
+};
 pub use flip::{Flip, flip};
 pub use tolerance::{Limit, Tolerance, Verdict};
 pub use view::{Mapping, Picture, difference_picture, picture};

@@ -294,7 +294,8 @@ fn outliers_are_counted_against_their_share() {
     let (_, verdict) = judge(&limit().with_outliers(share * 0.9), &reference, &subject);
     assert!(matches!(verdict, Verdict::Fail(why) if why.starts_with("3 texels (0.098 %) not")));
     assert_eq!(
-        texels_beyond(&reference, &subject, |_, difference| difference > 0.5),
+        texels_with(&reference, &subject, |difference| difference.absolute()
+            > 0.5),
         Ok(3)
     );
     assert!(
@@ -315,6 +316,41 @@ fn outliers_are_counted_against_their_share() {
         .1
         .passed()
     );
+}
+
+#[test]
+fn relative_limits_grow_with_the_value() {
+    let desc = TextureDesc::d2(2, 1, Format::R32Float);
+    let image = |values: [f32; 2]| {
+        ImageData::from_rgba_f32(desc, &values.map(|value| [value, 0.0, 0.0, 1.0])).unwrap()
+    };
+    let tolerance = |relative, absolute| Tolerance::Within {
+        limit: Limit::Relative { relative, absolute },
+        outliers: 0.0,
+        reason: "for the test".into(),
+    };
+    let (reference, subject) = (image([1000.0, 0.0]), image([1001.0, 0.01]));
+    assert!(
+        judge(&tolerance(0.001, 0.01), &reference, &subject)
+            .1
+            .passed()
+    );
+    assert!(
+        !judge(&tolerance(0.0009, 0.01), &reference, &subject)
+            .1
+            .passed()
+    );
+    assert!(
+        !judge(&tolerance(0.001, 0.009), &reference, &subject)
+            .1
+            .passed()
+    );
+    assert!(
+        !judge(&tolerance(f64::NAN, 1.0), &reference, &subject)
+            .1
+            .passed()
+    );
+    assert_eq!(tolerance(0.002, 0.0123456).summary(), "≤ 0.0123 + 0.200 %");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use etalon_core::image::ImageData;
 use serde::Serialize;
 
-use super::figures::{CompareError, Comparison, Ulps, texels_beyond};
+use super::figures::{CompareError, Comparison, Difference, Ulps, texels_with};
 
 /// How far an image may be from its reference.
 ///
@@ -38,6 +38,13 @@ pub enum Limit {
     Ulps(u64),
     /// In the unit of the decoded values.
     Absolute(f64),
+    /// In the unit of the decoded values: `absolute + relative · |reference|`.
+    Relative {
+        /// Share of the reference's magnitude.
+        relative: f64,
+        /// What is tolerated of 0.
+        absolute: f64,
+    },
 }
 
 impl Tolerance {
@@ -85,6 +92,9 @@ impl Tolerance {
                 let limit = match limit {
                     Limit::Ulps(max) => format!("≤ {max} ULP"),
                     Limit::Absolute(max) => format!("≤ {max}"),
+                    Limit::Relative { relative, absolute } => {
+                        format!("≤ {} + {} %", short(*absolute), short(relative * 100.0))
+                    }
                 };
                 if *outliers > 0.0 {
                     format!("{limit} but for {} %", outliers * 100.0)
@@ -124,14 +134,17 @@ impl Tolerance {
             } => (*limit, *outliers),
         };
         // Written so that a limit of NaN tolerates nothing.
-        let within = |ulps: Ulps, difference: f64| {
-            ulps != Ulps::INFINITE
+        let within = |difference: &Difference| {
+            difference.ulps != Ulps::INFINITE
                 && match limit {
-                    Limit::Ulps(max) => ulps <= Ulps(max),
-                    Limit::Absolute(max) => difference <= max,
+                    Limit::Ulps(max) => difference.ulps <= Ulps(max),
+                    Limit::Absolute(max) => difference.absolute() <= max,
+                    Limit::Relative { relative, absolute } => {
+                        difference.absolute() <= absolute + relative * difference.reference.abs()
+                    }
                 }
         };
-        if within(comparison.max_ulp, comparison.max_abs) {
+        if comparison.max_ulp == Ulps(0) {
             return Ok(Verdict::Pass);
         }
         if comparison.max_ulp == Ulps::INFINITE {
@@ -139,9 +152,7 @@ impl Tolerance {
                 "a NaN or infinity is in one image only".to_owned(),
             ));
         }
-        let beyond = texels_beyond(reference, subject, |ulps, difference| {
-            !within(ulps, difference)
-        })?;
+        let beyond = texels_with(reference, subject, |difference| !within(difference))?;
         let share = beyond as f64 / comparison.texels.max(1) as f64;
         if share <= outliers {
             return Ok(Verdict::Pass);
@@ -153,6 +164,15 @@ impl Tolerance {
             self.summary()
         )))
     }
+}
+
+/// A number in three significant digits.
+fn short(value: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 12.0) as usize;
+    format!("{value:.digits$}")
 }
 
 /// The outcome of one comparison.

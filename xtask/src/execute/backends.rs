@@ -12,7 +12,7 @@ use crate::test_backends::model::BackendKind;
 ///
 /// # Errors
 /// If there is no such device.
-pub fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
+pub(super) fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
     Ok(match job.backend {
         BackendKind::Cpu => Box::new(CpuBackend::new(&CpuOptions {
             threads: job.threads,

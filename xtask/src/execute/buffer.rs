@@ -11,7 +11,7 @@ use naga::{ScalarKind, TypeInner};
 ///
 /// # Errors
 /// If the buffer is empty or too large for an image.
-pub fn as_image(mut bytes: Vec<u8>, format: Format) -> Result<ImageData, ImageError> {
+pub(super) fn as_image(mut bytes: Vec<u8>, format: Format) -> Result<ImageData, ImageError> {
     bytes.resize(bytes.len().next_multiple_of(4), 0);
     let words = u32::try_from(bytes.len() / 4).unwrap_or(u32::MAX);
     ImageData::from_bytes(TextureDesc::d2(words, 1, format), bytes)
@@ -21,7 +21,7 @@ pub fn as_image(mut bytes: Vec<u8>, format: Format) -> Result<ImageData, ImageEr
 /// it: floats, signed integers, or, where it is a mixture, unsigned integers,
 /// which compares bits.
 #[must_use]
-pub fn format_of(plan: &Plan, pass: &str, binding: &str) -> Format {
+pub(super) fn format_of(plan: &Plan, pass: &str, binding: &str) -> Format {
     let kernel = plan.steps.iter().find_map(|step| match &step.step {
         Step::Dispatch { kernel, .. } if step.name == pass => Some(&kernel.0.module),
         _ => None,

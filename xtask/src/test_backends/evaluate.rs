@@ -13,7 +13,7 @@ use crate::setup;
 
 /// An execution to compare: who, and what is in which folder.
 #[derive(Clone, Copy, Debug)]
-pub struct Finished<'a> {
+pub(super) struct Finished<'a> {
     /// Who ran.
     pub executor: &'a Executor,
     /// What came out.
@@ -41,7 +41,7 @@ pub enum EvaluateError {
 /// ash with wgpu where both ran on one driver. The first of a pair is the
 /// reference.
 #[must_use]
-pub fn pairs<'a>(finished: &[Finished<'a>]) -> Vec<(Finished<'a>, Finished<'a>)> {
+pub(super) fn pairs<'a>(finished: &[Finished<'a>]) -> Vec<(Finished<'a>, Finished<'a>)> {
     let find = |backend, driver: &str| {
         let is = |candidate: &&Finished<'a>| {
             candidate.executor.backend == backend && candidate.executor.driver() == driver
@@ -71,7 +71,7 @@ pub fn pairs<'a>(finished: &[Finished<'a>]) -> Vec<(Finished<'a>, Finished<'a>)>
 ///
 /// # Errors
 /// If texels cannot be read or pictures cannot be written.
-pub fn compare_pair(
+pub(super) fn compare_pair(
     case: &Case,
     (reference, subject): (Finished<'_>, Finished<'_>),
     tolerance: impl Fn(&Capture) -> Tolerance,
@@ -136,7 +136,7 @@ pub fn compare_pair(
 }
 
 /// Fills in the verdict: `ok`, the problems and the notes.
-pub fn conclude(report: &mut Report) {
+pub(super) fn conclude(report: &mut Report) {
     let mut problems = Vec::new();
     let mut notes = Vec::new();
     let backend_of = |id: &str| {
@@ -154,6 +154,10 @@ pub fn conclude(report: &mut Report) {
         let line = match run.status {
             // The same in every case.
             Status::NoDevice { .. } => format!("{}: {reason}", run.executor),
+            // The same on every scene.
+            Status::Unsupported { .. } => {
+                format!("{} cannot run {}: {reason}", run.executor, run.case.effect)
+            }
             _ => format!(
                 "{} {} ({}): {reason}",
                 run.executor,

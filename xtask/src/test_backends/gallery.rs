@@ -22,7 +22,7 @@ pub struct GalleryError {
 
 /// The folder of a report's pictures.
 #[derive(Debug)]
-pub struct Gallery {
+pub(super) struct Gallery {
     folder: PathBuf,
     written: BTreeSet<PathBuf>,
 }
@@ -35,7 +35,7 @@ impl Gallery {
     ///
     /// # Errors
     /// If the folder cannot be made.
-    pub fn new(report: &Path) -> Result<Self, GalleryError> {
+    pub(super) fn new(report: &Path) -> Result<Self, GalleryError> {
         let folder = report.join(Self::FOLDER);
         std::fs::create_dir_all(&folder).map_err(|source| GalleryError {
             path: folder.clone(),
@@ -51,7 +51,7 @@ impl Gallery {
     ///
     /// # Errors
     /// If one cannot be written.
-    pub fn add(
+    pub(super) fn add(
         &mut self,
         reference: &ImageData,
         subject: &ImageData,

@@ -12,7 +12,7 @@ const SCRIPT: &str = include_str!("../report/script.js");
 
 /// The page. Pictures are looked for beside it.
 #[must_use]
-pub fn render(report: &Report) -> String {
+pub(super) fn render(report: &Report) -> String {
     let mut body = String::new();
     header(&mut body, report);
     executors(&mut body, report);

@@ -23,7 +23,12 @@ const DRIVER_VARIABLES: [&str; 2] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
 ///
 /// A job that takes longer than `limit` is ended and counts as crashed.
 #[must_use]
-pub fn run(program: &Path, job: &Job, target: &Target, limit: Duration) -> (Status, Option<Run>) {
+pub(super) fn run(
+    program: &Path,
+    job: &Job,
+    target: &Target,
+    limit: Duration,
+) -> (Status, Option<Run>) {
     let crashed = |reason: String| (Status::Crashed { reason }, None);
     let log = job.out.join("stderr.txt");
     let end = match start_and_wait(program, job, target, limit, &log) {

@@ -7,7 +7,7 @@ use crate::compare::{Comparison, Flip, Ulps};
 
 /// The whole report.
 #[must_use]
-pub fn render(report: &Report) -> String {
+pub(super) fn render(report: &Report) -> String {
     let mut text = String::new();
     executors(&mut text, report);
     for case in report.cases() {
@@ -144,7 +144,7 @@ fn passes(text: &mut String, report: &Report, case: &Case) {
 
 /// The largest of each figure over several comparisons: largest and mean
 /// distance, share of differing texels, FLIP.
-pub fn worst_of(comparisons: &[&ComparisonReport]) -> [String; 4] {
+pub(super) fn worst_of(comparisons: &[&ComparisonReport]) -> [String; 4] {
     let figures: Vec<&Comparison> = comparisons
         .iter()
         .filter_map(|comparison| comparison.figures.as_ref())
@@ -226,7 +226,7 @@ fn time(report: &Report, case: &Case, executor: &str, pass: &str) -> Option<u64>
 }
 
 /// How long all passes took on an executor, in nanoseconds.
-pub fn total_time(report: &Report, case: &Case, executor: &str) -> Option<u64> {
+pub(super) fn total_time(report: &Report, case: &Case, executor: &str) -> Option<u64> {
     match &report.run(case, executor)?.status {
         Status::Ran { times, .. } if !times.is_empty() => {
             Some(times.iter().map(|time| time.nanoseconds).sum())
@@ -236,12 +236,12 @@ pub fn total_time(report: &Report, case: &Case, executor: &str) -> Option<u64> {
 }
 
 /// Nanoseconds as milliseconds of three digits after the point.
-pub fn milliseconds(nanoseconds: u64) -> String {
+pub(super) fn milliseconds(nanoseconds: u64) -> String {
     format!("{:.3}", nanoseconds as f64 / 1e6)
 }
 
 /// A figure in three significant digits; 0 is `0` and nothing else is.
-pub fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     if value == 0.0 {
         "0".to_owned()
     } else if (0.001..100_000.0).contains(&value.abs()) {
@@ -253,7 +253,7 @@ pub fn number(value: f64) -> String {
 }
 
 /// A share in percent; 0 % is only nothing, 100 % only everything.
-pub fn percent(share: f64) -> String {
+pub(super) fn percent(share: f64) -> String {
     if share == 0.0 || share == 1.0 {
         format!("{} %", share * 100.0)
     } else if share > 0.999 {

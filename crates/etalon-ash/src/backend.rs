@@ -8,7 +8,7 @@ use etalon_core::plan::{MemoryModel, Plan, ResourceKind};
 use etalon_core::resource::Limits;
 
 use crate::commands::{Barriers, Commands};
-use crate::device::{AdoptedDevice, Device};
+use crate::device::Device;
 use crate::error::{NAME, malformed};
 use crate::history::{self, Histories, Pair};
 use crate::host::{self, HostSide};
@@ -93,28 +93,7 @@ impl AshBackend {
         Ok(Self::with(Device::new(instance, physical)?, options))
     }
 
-    /// A backend on an engine's device. It makes objects and allocates memory
-    /// there, and destroys what it has made, nothing else.
-    ///
-    /// # Errors
-    /// [`BackendError::NoDevice`] if the device lacks something, by name.
-    ///
-    /// # Safety
-    /// * The handles are valid, belong together, and outlive the backend and
-    ///   everything made with it.
-    /// * The features stated are enabled; if `debug_utils` is set, so is that
-    ///   extension.
-    /// * The promise of [`AshOptions::frames_in_flight`] is kept.
-    /// * When the backend is dropped, and when an [`AshTexture`] or
-    ///   [`AshBuffer`] is dropped after it, everything recorded with it has
-    ///   left the GPU.
-    /// * During [`Backend::execute`], which submits and waits, nobody else uses
-    ///   the queue.
-    pub unsafe fn adopt(adopted: AdoptedDevice, options: AshOptions) -> Result<Self, BackendError> {
-        Ok(Self::with(Device::adopt(adopted)?, options))
-    }
-
-    fn with(device: Device, options: AshOptions) -> Self {
+    pub(crate) fn with(device: Device, options: AshOptions) -> Self {
         let device = Arc::new(device);
         Self {
             options: AshOptions {

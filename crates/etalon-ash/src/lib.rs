@@ -63,37 +63,59 @@
 //! with [`Backend::memory`](etalon_core::backend::Backend::memory), so that
 //! these are the device's own sizes.
 //!
+//! # Unsafe code
+//! Vulkan's calls are in the modules that `lib.rs` allows to make them, each
+//! block with the reason why its conditions hold: wrappers own what they make
+//! and keep what they need, plans are checked before anything is made for
+//! them, and nothing is destroyed before the GPU has finished with it. What
+//! only an engine can know is a condition of the four functions it calls.
+//!
 //! # Devices
 //! Vulkan 1.3 with `synchronization2` and `maintenance4`, which every 1.3
 //! device has, and a queue that computes. [`enumerate`] lists what there is.
 
+#![deny(unsafe_code)]
+
 mod backend;
 mod bindings;
+#[allow(unsafe_code)]
 mod buffer;
 mod chains;
 mod check;
+#[allow(unsafe_code)]
 mod commands;
 mod convert;
+#[allow(unsafe_code)]
 mod device;
 mod engine;
 mod error;
 mod handover;
 mod heap;
 mod history;
+#[allow(unsafe_code)]
 mod host;
+#[allow(unsafe_code)]
 mod image;
+#[allow(unsafe_code)]
 mod instance;
+#[allow(unsafe_code)]
 mod memory;
+#[allow(unsafe_code)]
 mod physical;
+#[allow(unsafe_code)]
 mod pipeline;
 mod prepared;
+#[allow(unsafe_code)]
 mod queue;
+#[allow(unsafe_code)]
 mod record;
 mod run;
+#[allow(unsafe_code)]
 mod sets;
 mod texels;
 mod uniforms;
 mod usage;
+#[allow(unsafe_code)]
 mod validation;
 
 use std::sync::Arc;

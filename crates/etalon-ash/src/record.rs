@@ -1,19 +1,41 @@
-//! Plans in an engine's frame.
+//! Plans in an engine's frame: its device, its textures, its command buffers.
 
 use ash::vk;
 use etalon_core::backend::{Backend, BackendError};
 use etalon_core::plan::{Plan, ResourceKind, Step, Usage};
 
-use crate::backend::{AshBackend, run};
+use crate::backend::{AshBackend, AshOptions, run};
 use crate::bindings::{AshBindings, Given};
 use crate::buffer::Buffer;
 use crate::commands::{Barriers, Commands};
+use crate::device::{AdoptedDevice, Device};
 use crate::engine::{AdoptedBuffer, AdoptedTexture, AshBuffer, AshOutputs, AshTexture};
 use crate::error::unsupported;
 use crate::handover;
 use crate::image::{self, Image};
 
 impl AshBackend {
+    /// A backend on an engine's device. It makes objects and allocates memory
+    /// there, and destroys what it has made, nothing else.
+    ///
+    /// # Errors
+    /// [`BackendError::NoDevice`] if the device lacks something, by name.
+    ///
+    /// # Safety
+    /// * The handles are valid, belong together, and outlive the backend and
+    ///   everything made with it.
+    /// * The features stated are enabled; if `debug_utils` is set, so is that
+    ///   extension.
+    /// * The promise of [`AshOptions::frames_in_flight`] is kept.
+    /// * When the backend is dropped, and when an [`AshTexture`] or
+    ///   [`AshBuffer`] is dropped after it, everything recorded with it has
+    ///   left the GPU.
+    /// * During [`Backend::execute`], which submits and waits, nobody else uses
+    ///   the queue.
+    pub unsafe fn adopt(adopted: AdoptedDevice, options: AshOptions) -> Result<Self, BackendError> {
+        Ok(Self::with(Device::adopt(adopted)?, options))
+    }
+
     /// Makes an engine's image known, for [`AshBindings`].
     ///
     /// # Errors

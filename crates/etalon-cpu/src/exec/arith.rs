@@ -48,27 +48,28 @@ impl<N: Number> Visitor<N> for Select<'_> {
     }
 }
 
-/// A copy of a register that an instruction both reads and writes, so that the
-/// loop over lanes need not fear overlap.
+/// Whether an instruction writes a register that it also reads. Its loop over
+/// lanes then works on a copy, so that loops need never fear overlap.
 #[inline(always)]
-fn overlap<N: Number, A: ClassOf<N>, D: ClassOf<N>>(registers: &Registers<N>, operand: usize, result: usize) -> Option<Lanes<A::Lane>> {
-    (A::CLASS == D::CLASS && operand == result).then(|| *A::lanes(registers, operand))
+fn overlaps<N: Number, A: ClassOf<N>, D: ClassOf<N>>(varying: bool, operand: u16, result: u16) -> bool {
+    varying && A::CLASS == D::CLASS && operand == result
 }
 
 struct UnaryLanes<O>(PhantomData<O>);
 
 impl<N: Number, O: Unary<N>> Step<N> for UnaryLanes<O> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        let overlap = overlaps::<N, O::A, O::D>(true, instr.a, instr.d);
         for chunk in 0..state.chunks {
             let (d, a) = (state.at(instr.d, chunk), state.at(instr.a, chunk));
-            let copy = overlap::<N, O::A, O::D>(&state.registers, a, d);
-            let (d, rest) = O::D::split(&mut state.registers, d);
-            let a = match &copy {
-                Some(copy) => copy,
-                None => O::A::other(&rest, a),
-            };
-            map1(&mut d.0, &a.0, O::eval);
+            if overlap {
+                let a = *O::A::lanes(&state.registers, a);
+                map1(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, O::eval);
+            } else {
+                let (d, rest) = O::D::split(&mut state.registers, d);
+                map1(&mut d.0, &O::A::other(&rest, a).0, O::eval);
+            }
         }
     }
 }
@@ -77,7 +78,7 @@ struct UnaryUniform<O>(PhantomData<O>);
 
 impl<N: Number, O: Unary<N>> Step<N> for UnaryUniform<O> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let a = O::A::uniform(&state.registers, instr.a.into());
         O::D::set_uniform(&mut state.registers, instr.d.into(), O::eval(a));
     }
@@ -93,24 +94,25 @@ struct BinaryLanes<O, const AV: bool, const BV: bool>(PhantomData<O>);
 
 impl<N: Number, O: Binary<N>, const AV: bool, const BV: bool> Step<N> for BinaryLanes<O, AV, BV> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let one_a = uniform_unless::<N, O::A, AV>(&state.registers, instr.a);
         let one_b = uniform_unless::<N, O::B, BV>(&state.registers, instr.b);
+        let overlap = overlaps::<N, O::A, O::D>(AV, instr.a, instr.d) || overlaps::<N, O::B, O::D>(BV, instr.b, instr.d);
         for chunk in 0..state.chunks {
             let (d, a, b) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.b, chunk));
-            let copy_a = if AV { overlap::<N, O::A, O::D>(&state.registers, a, d) } else { None };
-            let copy_b = if BV { overlap::<N, O::B, O::D>(&state.registers, b, d) } else { None };
+            if overlap {
+                let a = if AV { *O::A::lanes(&state.registers, a) } else { Lanes([one_a; LANES]) };
+                let b = if BV { *O::B::lanes(&state.registers, b) } else { Lanes([one_b; LANES]) };
+                map2(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, &b.0, O::eval);
+                continue;
+            }
             let (d, rest) = O::D::split(&mut state.registers, d);
             if AV && BV {
-                let a = copy_a.as_ref().unwrap_or_else(|| O::A::other(&rest, a));
-                let b = copy_b.as_ref().unwrap_or_else(|| O::B::other(&rest, b));
-                map2(&mut d.0, &a.0, &b.0, O::eval);
+                map2(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, O::eval);
             } else if AV {
-                let a = copy_a.as_ref().unwrap_or_else(|| O::A::other(&rest, a));
-                map1(&mut d.0, &a.0, |a| O::eval(a, one_b));
+                map1(&mut d.0, &O::A::other(&rest, a).0, |a| O::eval(a, one_b));
             } else {
-                let b = copy_b.as_ref().unwrap_or_else(|| O::B::other(&rest, b));
-                map1(&mut d.0, &b.0, |b| O::eval(one_a, b));
+                map1(&mut d.0, &O::B::other(&rest, b).0, |b| O::eval(one_a, b));
             }
         }
     }
@@ -120,7 +122,7 @@ struct BinaryUniform<O>(PhantomData<O>);
 
 impl<N: Number, O: Binary<N>> Step<N> for BinaryUniform<O> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let a = O::A::uniform(&state.registers, instr.a.into());
         let b = O::B::uniform(&state.registers, instr.b.into());
         O::D::set_uniform(&mut state.registers, instr.d.into(), O::eval(a, b));
@@ -131,27 +133,31 @@ struct TernaryLanes<O, const AV: bool, const BV: bool, const CV: bool>(PhantomDa
 
 impl<N: Number, O: Ternary<N>, const AV: bool, const BV: bool, const CV: bool> Step<N> for TernaryLanes<O, AV, BV, CV> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let one_a = uniform_unless::<N, O::A, AV>(&state.registers, instr.a);
         let one_b = uniform_unless::<N, O::B, BV>(&state.registers, instr.b);
         let one_c = uniform_unless::<N, O::C, CV>(&state.registers, instr.c);
+        let overlap = overlaps::<N, O::A, O::D>(AV, instr.a, instr.d)
+            || overlaps::<N, O::B, O::D>(BV, instr.b, instr.d)
+            || overlaps::<N, O::C, O::D>(CV, instr.c, instr.d);
         for chunk in 0..state.chunks {
             let (d, a, b, c) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.b, chunk), state.at(instr.c, chunk));
-            let copy_a = if AV { overlap::<N, O::A, O::D>(&state.registers, a, d) } else { None };
-            let copy_b = if BV { overlap::<N, O::B, O::D>(&state.registers, b, d) } else { None };
-            let copy_c = if CV { overlap::<N, O::C, O::D>(&state.registers, c, d) } else { None };
+            if overlap {
+                let a = if AV { *O::A::lanes(&state.registers, a) } else { Lanes([one_a; LANES]) };
+                let b = if BV { *O::B::lanes(&state.registers, b) } else { Lanes([one_b; LANES]) };
+                let c = if CV { *O::C::lanes(&state.registers, c) } else { Lanes([one_c; LANES]) };
+                map3(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, &b.0, &c.0, O::eval);
+                continue;
+            }
             let (d, rest) = O::D::split(&mut state.registers, d);
-            let lanes_a = || copy_a.as_ref().unwrap_or_else(|| O::A::other(&rest, a));
-            let lanes_b = || copy_b.as_ref().unwrap_or_else(|| O::B::other(&rest, b));
-            let lanes_c = || copy_c.as_ref().unwrap_or_else(|| O::C::other(&rest, c));
             match (AV, BV, CV) {
-                (true, true, true) => map3(&mut d.0, &lanes_a().0, &lanes_b().0, &lanes_c().0, O::eval),
-                (true, true, false) => map2(&mut d.0, &lanes_a().0, &lanes_b().0, |a, b| O::eval(a, b, one_c)),
-                (true, false, true) => map2(&mut d.0, &lanes_a().0, &lanes_c().0, |a, c| O::eval(a, one_b, c)),
-                (false, true, true) => map2(&mut d.0, &lanes_b().0, &lanes_c().0, |b, c| O::eval(one_a, b, c)),
-                (true, false, false) => map1(&mut d.0, &lanes_a().0, |a| O::eval(a, one_b, one_c)),
-                (false, true, false) => map1(&mut d.0, &lanes_b().0, |b| O::eval(one_a, b, one_c)),
-                (false, false, _) => map1(&mut d.0, &lanes_c().0, |c| O::eval(one_a, one_b, c)),
+                (true, true, true) => map3(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, &O::C::other(&rest, c).0, O::eval),
+                (true, true, false) => map2(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, |a, b| O::eval(a, b, one_c)),
+                (true, false, true) => map2(&mut d.0, &O::A::other(&rest, a).0, &O::C::other(&rest, c).0, |a, c| O::eval(a, one_b, c)),
+                (false, true, true) => map2(&mut d.0, &O::B::other(&rest, b).0, &O::C::other(&rest, c).0, |b, c| O::eval(one_a, b, c)),
+                (true, false, false) => map1(&mut d.0, &O::A::other(&rest, a).0, |a| O::eval(a, one_b, one_c)),
+                (false, true, false) => map1(&mut d.0, &O::B::other(&rest, b).0, |b| O::eval(one_a, b, one_c)),
+                (false, false, _) => map1(&mut d.0, &O::C::other(&rest, c).0, |c| O::eval(one_a, one_b, c)),
             }
         }
     }
@@ -161,7 +167,7 @@ struct TernaryUniform<O>(PhantomData<O>);
 
 impl<N: Number, O: Ternary<N>> Step<N> for TernaryUniform<O> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let a = O::A::uniform(&state.registers, instr.a.into());
         let b = O::B::uniform(&state.registers, instr.b.into());
         let c = O::C::uniform(&state.registers, instr.c.into());
@@ -211,7 +217,7 @@ struct CopyUniform<C>(PhantomData<C>);
 
 impl<N: Number, C: ClassOf<N>> Step<N> for CopyUniform<C> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let a = C::uniform(&state.registers, instr.a.into());
         C::set_uniform(&mut state.registers, instr.d.into(), a);
     }
@@ -221,7 +227,7 @@ struct CopyLanes<C, const VARYING: bool>(PhantomData<C>);
 
 impl<N: Number, C: ClassOf<N>, const VARYING: bool> Step<N> for CopyLanes<C, VARYING> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         for chunk in 0..state.chunks {
             let a = if VARYING { *C::lanes(&state.registers, state.at(instr.a, chunk)) } else { Lanes([C::uniform(&state.registers, instr.a.into()); LANES]) };
             let d = state.at(instr.d, chunk);
@@ -234,7 +240,7 @@ struct CopyMaskedFloats<const VARYING: bool>;
 
 impl<N: Number, const VARYING: bool> Step<N> for CopyMaskedFloats<VARYING> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         use crate::registers::{Float, Int};
         let one = uniform_unless::<N, Float, VARYING>(&state.registers, instr.a);
         for chunk in 0..state.chunks {
@@ -258,7 +264,7 @@ struct CopyMaskedInts<const VARYING: bool>;
 
 impl<N: Number, const VARYING: bool> Step<N> for CopyMaskedInts<VARYING> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         use crate::registers::Int;
         let one = uniform_unless::<N, Int, VARYING>(&state.registers, instr.a);
         for chunk in 0..state.chunks {

@@ -126,7 +126,7 @@ struct Load<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for Load<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::ImageLoad { access, level, .. } = inst.op else { return };
         let Some(texture) = texture(state, access.image) else { return };
@@ -158,7 +158,7 @@ pub(super) struct Store;
 
 impl<N: Number> Step<N> for Store {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::ImageStore { access, .. } = inst.op else { return };
         let Some(texture) = texture(state, access.image) else { return };
@@ -228,7 +228,7 @@ struct Query<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for Query<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::ImageQuery { image, query }, Some(Some(to))) = (inst.op, inst.results.first().copied()) else { return };
         let Some(texture) = texture(state, image) else { return };

@@ -49,7 +49,7 @@ impl<N: Number> Linked<N> {
 
     /// Runs the instructions that fill the uniform registers once per worker.
     pub(super) fn run_prologue(&self, state: &mut State<'_, N>) {
-        for &(handler, instr) in &self.calls[..state.code.prologue as usize] {
+        for (handler, instr) in &self.calls[..state.code.prologue as usize] {
             handler.call(state, instr);
         }
     }
@@ -60,7 +60,7 @@ impl<N: Number> Linked<N> {
         let mut next = 0_u32;
         loop {
             let block = code.blocks[next as usize];
-            for &(handler, instr) in &self.calls[block.start as usize..block.stop as usize] {
+            for (handler, instr) in &self.calls[block.start as usize..block.stop as usize] {
                 handler.call(state, instr);
             }
             next = match block.end {
@@ -123,7 +123,7 @@ struct Barrier;
 
 impl<N: Number> Step<N> for Barrier {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         for chunk in 0..state.chunks {
             let active = state.local_ids.active[state.first_chunk + chunk].0;

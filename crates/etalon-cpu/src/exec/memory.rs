@@ -24,7 +24,7 @@ pub(super) struct InputStep;
 
 impl<N: Number> Step<N> for InputStep {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::Input(input), Some(to)) = (inst.op, result(inst)) else { return };
         let axis = |axis: u8| usize::from(axis.min(2));
@@ -59,7 +59,7 @@ struct Table<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for Table<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::Table { table, .. }, Some(to)) = (inst.op, result(inst)) else { return };
         let table = &state.code.resources.tables[table as usize];
@@ -90,7 +90,7 @@ struct BufferLoad<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for BufferLoad<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::BufferLoad { buffer, offset, .. }, Some(to)) = (inst.op, result(inst)) else { return };
         let (words, _) = words(state, buffer);
@@ -107,7 +107,7 @@ pub(super) struct BufferStore;
 
 impl<N: Number> Step<N> for BufferStore {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::BufferStore { buffer, offset, .. } = inst.op else { return };
         let (words, _) = words(state, buffer);
@@ -130,7 +130,7 @@ pub(super) struct BufferLength;
 
 impl<N: Number> Step<N> for BufferLength {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::BufferLength { buffer, offset, stride }, Some(to)) = (inst.op, result(inst)) else { return };
         let (_, bytes) = words(state, buffer);
@@ -142,7 +142,7 @@ impl<N: Number> Step<N> for BufferLength {
 pub(super) struct BufferAtomic;
 
 impl<N: Number> Step<N> for BufferAtomic {
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::BufferAtomic { buffer, offset, function } = inst.op else { return };
         let (words, _) = words(state, buffer);
@@ -156,7 +156,7 @@ impl<N: Number> Step<N> for BufferAtomic {
 pub(super) struct WorkgroupAtomic;
 
 impl<N: Number> Step<N> for WorkgroupAtomic {
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::WorkgroupAtomic { slot, function } = inst.op else { return };
         atomic(state, inst, function, |state, index, first, second| {
@@ -218,7 +218,7 @@ struct MemoryLoad<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for MemoryLoad<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let (Op::MemoryLoad { memory, slot, class }, Some(to)) = (inst.op, result(inst)) else { return };
         let chunks = state.chunks;
@@ -250,7 +250,7 @@ pub(super) struct MemoryStore;
 
 impl<N: Number> Step<N> for MemoryStore {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::MemoryStore { memory, slot, class } = inst.op else { return };
         let chunks = state.chunks;

@@ -24,7 +24,7 @@ struct Sample<const K: usize>;
 
 impl<N: Number, const K: usize> Step<N> for Sample<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: Instr) {
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::ImageSample { access, sampler } = inst.op else { return };
         let Some(texture) = texture(state, access.image) else { return };
@@ -75,9 +75,86 @@ impl<const K: usize> Request<'_, K> {
         let mut sum = [[0.0; K]; 4];
         for step in 0..levels {
             let scale = weight.map(|weight| if step == 1 { weight } else { 1.0 - weight });
-            self.add_level(&level.map(|level| (level + step).min(last)), &scale, position, &mut sum);
+            let level = level.map(|level| (level + step).min(last));
+            let flat = !self.cube && !self.volume;
+            match self.texture.levels.get(level[0] as usize) {
+                Some(&one) if flat && level.iter().fold(0, |all, other| all | (other ^ level[0])) == 0 => {
+                    self.add_flat(one, &scale, [&position[0], &position[1]], &mut sum);
+                }
+                _ => self.add_level(&level, &scale, position, &mut sum),
+            }
         }
         sum
+    }
+
+    /// Adds what one level of a flat texture has at `position`, times `scale`.
+    #[inline(always)]
+    fn add_flat(&self, level: Level, scale: &[f32; K], position: [&[f32; K]; 2], sum: &mut [[f32; K]; 4]) {
+        let Level { width, height, depth, start } = level;
+        let linear = self.sampler.filter == Filter::Linear;
+        let (x, fx) = self.axis(position[0], &[width; K]);
+        let (y, fy) = self.axis(position[1], &[height; K]);
+        let columns = self.columns(&x, width);
+        let mut rows = self.columns(&y, height);
+        for k in 0..K {
+            let layer = (self.layer[k] as i32).clamp(0, depth as i32 - 1) as u32;
+            for row in &mut rows {
+                row[k] = start + (layer * height + row[k]) * width;
+            }
+        }
+        for tap in 0..if linear { 4 } else { 1 } {
+            let (dx, dy) = (tap & 1, tap >> 1);
+            let (mut index, mut weight) = ([0; K], *scale);
+            for k in 0..K {
+                index[k] = rows[dy][k] + columns[dx][k];
+            }
+            if linear {
+                for k in 0..K {
+                    let horizontal = if dx == 1 { fx[k] } else { 1.0 - fx[k] };
+                    let vertical = if dy == 1 { fy[k] } else { 1.0 - fy[k] };
+                    weight[k] = weight[k] * horizontal * vertical;
+                }
+            }
+            self.add_weighted(&index, &weight, sum);
+        }
+    }
+
+    /// Addresses of the first and second texels along an axis.
+    #[inline(always)]
+    fn columns(&self, first: &[i32; K], size: u32) -> [[u32; K]; 2] {
+        let mut columns = [[0; K]; 2];
+        match self.sampler.address {
+            AddressMode::ClampToEdge => {
+                let last = size as i32 - 1;
+                for k in 0..K {
+                    columns[0][k] = first[k].max(0).min(last) as u32;
+                    columns[1][k] = (first[k].min(last) + 1).max(0).min(last) as u32;
+                }
+            }
+            _ => {
+                for k in 0..K {
+                    columns[0][k] = self.address(first[k], size);
+                    columns[1][k] = self.address(first[k].saturating_add(1), size);
+                }
+            }
+        }
+        columns
+    }
+
+    /// Adds texels times their weights.
+    #[inline(always)]
+    fn add_weighted(&self, index: &[u32; K], weight: &[f32; K], sum: &mut [[f32; K]; 4]) {
+        let mut words = [[0; K]; 2];
+        gather(self.texture.texels, index, &mut words);
+        let mut channels = [[0; K]; 4];
+        decode(self.texture.desc().format, &words, self.wanted, &mut channels);
+        for (channel, sum) in sum.iter_mut().enumerate() {
+            if self.wanted[channel] {
+                for k in 0..K {
+                    sum[k] += weight[k] * f32::from_bits(channels[channel][k]);
+                }
+            }
+        }
     }
 
     /// Adds what a level has at `position`, times `scale`.
@@ -140,17 +217,7 @@ impl<const K: usize> Request<'_, K> {
                 }
             }
         }
-        let mut words = [[0; K]; 2];
-        gather(self.texture.texels, &index, &mut words);
-        let mut channels = [[0; K]; 4];
-        decode(self.texture.desc().format, &words, self.wanted, &mut channels);
-        for (channel, sum) in sum.iter_mut().enumerate() {
-            if self.wanted[channel] {
-                for k in 0..K {
-                    sum[k] += weight[k] * f32::from_bits(channels[channel][k]);
-                }
-            }
-        }
+        self.add_weighted(&index, &weight, sum);
     }
 
     #[inline(always)]

@@ -69,10 +69,10 @@ impl fmt::Display for Tier {
 
 /// What an instruction does to a worker's state.
 pub(super) trait Step<N: Number> {
-    fn run(state: &mut State<'_, N>, instr: Instr);
+    fn run(state: &mut State<'_, N>, instr: &Instr);
 }
 
-type Function<N> = unsafe fn(&mut State<'_, N>, Instr);
+type Function<N> = unsafe fn(&mut State<'_, N>, &Instr);
 
 /// A [`Step`] compiled for an instruction set that this processor has.
 #[derive(Debug)]
@@ -105,7 +105,7 @@ impl<N: Number> Handler<N> {
     }
 
     #[inline(always)]
-    pub(super) fn call(self, state: &mut State<'_, N>, instr: Instr) {
+    pub(super) fn call(self, state: &mut State<'_, N>, instr: &Instr) {
         // SAFETY: of the two constructors `plain` takes functions without target
         // features, and `new` takes one with them only after the processor was
         // seen to have them.
@@ -115,12 +115,12 @@ impl<N: Number> Handler<N> {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn avx2<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: Instr) {
+fn avx2<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: &Instr) {
     S::run(state, instr);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
-fn avx512<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: Instr) {
+fn avx512<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: &Instr) {
     S::run(state, instr);
 }

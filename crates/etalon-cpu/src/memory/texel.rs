@@ -14,6 +14,27 @@ pub(crate) type Words<const K: usize> = [[u64; K]; 2];
 /// Channels of `K` texels as bits: of `f32`, `i32` or `u32`.
 pub(crate) type Channels<const K: usize> = [[u32; K]; 4];
 
+// Loops as macros: a closure might not be inlined, and then would not be
+// compiled for the instruction set of the handler around it.
+
+macro_rules! each {
+    ($wanted:expr, $out:expr, $k:ident, $channel:expr) => {
+        if $wanted {
+            for $k in 0..K {
+                $out[$k] = $channel;
+            }
+        }
+    };
+}
+
+macro_rules! words {
+    ($out:expr, $k:ident, $word:expr) => {
+        for $k in 0..K {
+            $out[$k] = $word;
+        }
+    };
+}
+
 /// Reads the channels that `wanted` asks for; the others are left alone.
 #[inline(always)]
 pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [bool; 4], out: &mut Channels<K>) {
@@ -21,58 +42,58 @@ pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [
     let [low, high] = words;
     match format {
         Format::R32Float | Format::Depth32Float => {
-            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            each!(wanted[0], out[0], k, low[k] as u32);
             fill(wanted, out, 1, 0, one);
         }
         Format::R32Uint | Format::R32Sint => {
-            each(wanted[0], &mut out[0], |k| low[k] as u32);
+            each!(wanted[0], out[0], k, low[k] as u32);
             fill(wanted, out, 1, 0, 1);
         }
         Format::Rg32Float => {
-            each(wanted[0], &mut out[0], |k| low[k] as u32);
-            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
+            each!(wanted[0], out[0], k, low[k] as u32);
+            each!(wanted[1], out[1], k, (low[k] >> 32) as u32);
             fill(wanted, out, 2, 0, one);
         }
         Format::Rg32Uint | Format::Rg32Sint => {
-            each(wanted[0], &mut out[0], |k| low[k] as u32);
-            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
+            each!(wanted[0], out[0], k, low[k] as u32);
+            each!(wanted[1], out[1], k, (low[k] >> 32) as u32);
             fill(wanted, out, 2, 0, 1);
         }
         Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint => {
-            each(wanted[0], &mut out[0], |k| low[k] as u32);
-            each(wanted[1], &mut out[1], |k| (low[k] >> 32) as u32);
-            each(wanted[2], &mut out[2], |k| high[k] as u32);
-            each(wanted[3], &mut out[3], |k| (high[k] >> 32) as u32);
+            each!(wanted[0], out[0], k, low[k] as u32);
+            each!(wanted[1], out[1], k, (low[k] >> 32) as u32);
+            each!(wanted[2], out[2], k, high[k] as u32);
+            each!(wanted[3], out[3], k, (high[k] >> 32) as u32);
         }
         Format::R16Float => {
-            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
             fill(wanted, out, 1, 0, one);
         }
         Format::Rg16Float => {
-            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
-            each(wanted[1], &mut out[1], |k| f16_to_f32(low[k] as u32 >> 16).to_bits());
+            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each!(wanted[1], out[1], k, f16_to_f32(low[k] as u32 >> 16).to_bits());
             fill(wanted, out, 2, 0, one);
         }
         Format::Rgba16Float => {
-            each(wanted[0], &mut out[0], |k| f16_to_f32(low[k] as u32 & 0xffff).to_bits());
-            each(wanted[1], &mut out[1], |k| f16_to_f32(low[k] as u32 >> 16).to_bits());
-            each(wanted[2], &mut out[2], |k| f16_to_f32((low[k] >> 32) as u32 & 0xffff).to_bits());
-            each(wanted[3], &mut out[3], |k| f16_to_f32((low[k] >> 32) as u32 >> 16).to_bits());
+            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each!(wanted[1], out[1], k, f16_to_f32(low[k] as u32 >> 16).to_bits());
+            each!(wanted[2], out[2], k, f16_to_f32((low[k] >> 32) as u32 & 0xffff).to_bits());
+            each!(wanted[3], out[3], k, f16_to_f32((low[k] >> 32) as u32 >> 16).to_bits());
         }
         Format::R8Unorm => {
-            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
+            each!(wanted[0], out[0], k, unorm8(low[k] as u32));
             fill(wanted, out, 1, 0, one);
         }
         Format::Rg8Unorm => {
-            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
-            each(wanted[1], &mut out[1], |k| unorm8(low[k] as u32 >> 8));
+            each!(wanted[0], out[0], k, unorm8(low[k] as u32));
+            each!(wanted[1], out[1], k, unorm8(low[k] as u32 >> 8));
             fill(wanted, out, 2, 0, one);
         }
         Format::Rgba8Unorm => {
-            each(wanted[0], &mut out[0], |k| unorm8(low[k] as u32));
-            each(wanted[1], &mut out[1], |k| unorm8(low[k] as u32 >> 8));
-            each(wanted[2], &mut out[2], |k| unorm8(low[k] as u32 >> 16));
-            each(wanted[3], &mut out[3], |k| unorm8(low[k] as u32 >> 24));
+            each!(wanted[0], out[0], k, unorm8(low[k] as u32));
+            each!(wanted[1], out[1], k, unorm8(low[k] as u32 >> 8));
+            each!(wanted[2], out[2], k, unorm8(low[k] as u32 >> 16));
+            each!(wanted[3], out[3], k, unorm8(low[k] as u32 >> 24));
         }
         _ => {
             for k in 0..K {
@@ -88,15 +109,6 @@ pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [
                     lanes[k] = channel;
                 }
             }
-        }
-    }
-}
-
-#[inline(always)]
-fn each<const K: usize>(wanted: bool, out: &mut [u32; K], channel: impl Fn(usize) -> u32) {
-    if wanted {
-        for (k, lane) in out.iter_mut().enumerate() {
-            *lane = channel(k);
         }
     }
 }
@@ -121,18 +133,18 @@ fn unorm8(code: u32) -> u32 {
 pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out: &mut Words<K>) {
     let [r, g, b, a] = channels;
     match format {
-        Format::R32Float | Format::R32Uint | Format::R32Sint => words(&mut out[0], |k| u64::from(r[k])),
-        Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint => words(&mut out[0], |k| pair(r[k], g[k])),
+        Format::R32Float | Format::R32Uint | Format::R32Sint => words!(out[0], k, u64::from(r[k])),
+        Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint => words!(out[0], k, pair(r[k], g[k])),
         Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint => {
-            words(&mut out[0], |k| pair(r[k], g[k]));
-            words(&mut out[1], |k| pair(b[k], a[k]));
+            words!(out[0], k, pair(r[k], g[k]));
+            words!(out[1], k, pair(b[k], a[k]));
         }
-        Format::R16Float => words(&mut out[0], |k| u64::from(half(r[k]))),
-        Format::Rg16Float => words(&mut out[0], |k| u64::from(half(r[k]) | (half(g[k]) << 16))),
-        Format::Rgba16Float => words(&mut out[0], |k| pair(half(r[k]) | (half(g[k]) << 16), half(b[k]) | (half(a[k]) << 16))),
-        Format::R8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]))),
-        Format::Rg8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]) | (code8(g[k]) << 8))),
-        Format::Rgba8Unorm => words(&mut out[0], |k| u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))),
+        Format::R16Float => words!(out[0], k, u64::from(half(r[k]))),
+        Format::Rg16Float => words!(out[0], k, u64::from(half(r[k]) | (half(g[k]) << 16))),
+        Format::Rgba16Float => words!(out[0], k, pair(half(r[k]) | (half(g[k]) << 16), half(b[k]) | (half(a[k]) << 16))),
+        Format::R8Unorm => words!(out[0], k, u64::from(code8(r[k]))),
+        Format::Rg8Unorm => words!(out[0], k, u64::from(code8(r[k]) | (code8(g[k]) << 8))),
+        Format::Rgba8Unorm => words!(out[0], k, u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))),
         _ => {
             for k in 0..K {
                 let bits = [r[k], g[k], b[k], a[k]];
@@ -150,13 +162,6 @@ pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out
                 out[1][k] = u64::from_le_bytes(high);
             }
         }
-    }
-}
-
-#[inline(always)]
-fn words<const K: usize>(out: &mut [u64; K], word: impl Fn(usize) -> u64) {
-    for (k, out) in out.iter_mut().enumerate() {
-        *out = word(k);
     }
 }
 

@@ -280,7 +280,7 @@ fn broken_light_costs_its_own_texel_only() {
     ];
     let picture = image(Format::Rgba16Float, 12, 1, |x, _| {
         let x = x as usize;
-        if x % 2 == 0 {
+        if x.is_multiple_of(2) {
             [odd[x / 2], 0.25, odd[x / 2], odd[x / 2]]
         } else {
             [0.25; 4]

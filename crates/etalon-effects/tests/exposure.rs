@@ -132,13 +132,13 @@ fn texels_that_are_no_numbers_do_not_count() {
     let colour = image(Format::Rgba16Float, 40, 20, |x, y| {
         let index = (x + 40 * y) as usize;
         let mut texel = [0.5, 0.5, 0.5, 1.0];
-        if index % 7 == 0 {
+        if index.is_multiple_of(7) {
             texel[index % 3] = odd[index % 9 / 3];
         }
         texel
     });
     let [sum, weight] = measured(&colour, &settings);
-    let left_out = (0..800).filter(|index| index % 7 == 0).count();
+    let left_out = (0..800_u32).filter(|index| index.is_multiple_of(7)).count();
     assert_eq!(weight, (800 - left_out) as f64);
     assert!((sum / weight - 0.5).abs() <= 0.5 * 28.0 * U);
     // Negative light counts as none.

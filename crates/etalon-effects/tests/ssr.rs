@@ -358,7 +358,7 @@ fn any_bit_pattern_gives_finite_reflections() {
         // Depths of every magnitude, and bit patterns of every kind.
         let depth = image(Format::R32Float, width, height, |x, y| {
             let random = bits(seed)(x, y);
-            let value = if random % 3 == 0 {
+            let value = if random.is_multiple_of(3) {
                 f32::from_bits(random)
             } else {
                 (random % 1000) as f32 / 1000.0
@@ -368,7 +368,7 @@ fn any_bit_pattern_gives_finite_reflections() {
         let normal = image(Format::Rgba32Float, width, height, |x, y| {
             let channel = |c: u32| {
                 let random = bits(seed + 7 * c)(x, y);
-                if random % 5 == 0 {
+                if random.is_multiple_of(5) {
                     f32::from_bits(random)
                 } else {
                     random as f32 / u32::MAX as f32 * 2.0 - 1.0
@@ -614,4 +614,164 @@ fn the_specular_map_says_how_much_and_how_sharp() {
     close(&replaced[2], [2.75, 1.35, 1.0, 0.25]);
     // Without a blurred reflection every surface is sharp.
     close(&mixed(false, Blend::Add)[2], [5.0, 1.8, 1.0, 0.25]);
+}
+
+#[test]
+fn a_specular_map_of_any_kind_is_read_alike() {
+    let scene = image(Format::Rgba16Float, 4, 1, |_, _| [1.0; 4]);
+    let sharp = image(Format::Rgba16Float, 4, 1, |_, _| [4.1, 0.3, 700.0, 0.5]);
+    let blurred = image(Format::Rgba16Float, 4, 1, |_, _| [2.3, 0.7, 90.0, 0.25]);
+    let mixed = |specular: &ImageData| {
+        let mut run = Run::new();
+        let handles = [
+            ("scene", &scene),
+            ("specular", specular),
+            ("sharp", &sharp),
+            ("blurred", &blurred),
+        ]
+        .map(|(name, image)| run.import(name, image));
+        let result = mix(
+            &mut run.graph,
+            handles[0],
+            handles[1],
+            handles[2],
+            Some(handles[3]),
+            Blend::Add,
+        );
+        texels(&run.output(result.expect("equal sizes")))
+    };
+    // A device may decode 8 bits to a neighbour of k / 255; what it reads is the
+    // same.
+    let code = |x: u32, c: u32| (37 * x + 61 * c + 5) as f32 / 255.0;
+    let exact = image(Format::Rgba8Unorm, 4, 1, |x, _| {
+        [0, 1, 2, 3].map(|c| code(x, c))
+    });
+    let off = image(Format::Rgba32Float, 4, 1, |x, _| {
+        [0, 1, 2, 3].map(|c| {
+            if c % 2 == 0 {
+                code(x, c).next_up()
+            } else {
+                code(x, c).next_down()
+            }
+        })
+    });
+    assert_eq!(mixed(&exact), mixed(&off));
+    // What is no share of anything counts as the nearest that is.
+    let odd = image(Format::Rgba32Float, 4, 1, |x, _| match x {
+        0 => [f32::NAN, -1.0, f32::INFINITY, 1.0],
+        1 => [0.5, 0.5, 0.5, f32::NAN],
+        2 => [0.5, 0.5, 0.5, 7.0],
+        _ => [f32::NEG_INFINITY; 4],
+    });
+    let meant = image(Format::Rgba32Float, 4, 1, |x, _| match x {
+        0 => [0.0, 0.0, 1.0, 1.0],
+        1 => [0.5, 0.5, 0.5, 0.0],
+        2 => [0.5, 0.5, 0.5, 1.0],
+        _ => [0.0; 4],
+    });
+    assert_eq!(mixed(&odd), mixed(&meant));
+}
+
+/// A wall at twice `unit` in the left half of the picture, and in the right
+/// half, at four times `unit`, a mirror whose normal leans left by `angle`:
+/// its rays come back toward the eye and enter the wall from behind.
+fn mirror_behind_a_wall(
+    side: u32,
+    unit: f32,
+    near: f32,
+    normal: [f32; 4],
+) -> (ImageData, ImageData) {
+    let left = |x: u32| x < side / 2;
+    let depth = image(Format::R32Float, side, side, |x, _| {
+        [
+            near / (unit * if left(x) { 2.0 } else { 4.0 }),
+            0.0,
+            0.0,
+            0.0,
+        ]
+    });
+    let normals = image(Format::Rgba32Float, side, side, |x, _| {
+        if left(x) {
+            [0.0, 0.0, 1.0, 1.0]
+        } else {
+            normal
+        }
+    });
+    (depth, normals)
+}
+
+#[test]
+fn rays_past_the_eye_are_cut_before_they_are_projected() {
+    let side = 64;
+    let angle = 0.6_f64;
+    let normal = glam::DVec3::new(-angle.sin(), 0.0, angle.cos());
+    let lean = [normal.x as f32, 0.0, normal.z as f32, 1.0];
+    // The second is a scene so large that f32 has no place for its near plane.
+    for (unit, near) in [(1.0_f32, 0.1_f32), (1e5, 1e-6)] {
+        let camera = CameraParams::perspective(1.0, 1.0, near);
+        let thickness = 0.1 * unit;
+        let settings = Ssr {
+            thickness,
+            max_distance: (50.0 * unit).min(1e6),
+            steps: 16,
+            ..PLAIN
+        };
+        let (depth, normals) = mirror_behind_a_wall(side, unit, near, lean);
+        let found = marched(&depth, &normals, &camera, &settings);
+        let scale = f64::from(camera.scale.x);
+        let mut checked = 0;
+        for y in 0..side {
+            for x in side / 2..side {
+                let ndc = |i: u32| f64::from(2 * i + 1) / f64::from(side) - 1.0;
+                let start =
+                    glam::DVec3::new(ndc(x) / scale, -ndc(y) / scale, -1.0) * 4.0 * f64::from(unit);
+                let view = start.normalize();
+                let ray = view - normal * (2.0 * view.dot(normal));
+                assert!(ray.z > 0.0);
+                // Behind the wall all the way, until within its thickness.
+                let t = (2.0 * f64::from(unit) + f64::from(thickness) + start.z) / -ray.z;
+                let hit = start + ray * t;
+                let u = 0.5 + 0.5 * scale * hit.x / -hit.z;
+                let v = 0.5 - 0.5 * scale * hit.y / -hit.z;
+                let inside = |x: f64| (0.03..0.97).contains(&x);
+                // Where that point is not before the wall, or at its edge, the
+                // answer is another one.
+                if !(u < 0.47 && inside(u) && inside(v)) {
+                    continue;
+                }
+                checked += 1;
+                let texel = found[(y * side + x) as usize];
+                let error = (f64::from(texel[0]) - u)
+                    .abs()
+                    .max((f64::from(texel[1]) - v).abs());
+                assert!(texel[2] == 1.0, "{unit}: ({x}, {y}) misses ({u}, {v})");
+                assert!(
+                    error * f64::from(side) <= 1.0,
+                    "{unit}: ({x}, {y}): {texel:?} for ({u}, {v})"
+                );
+            }
+        }
+        assert!(checked > 100, "{checked}");
+    }
+}
+
+#[test]
+fn surfaces_seen_from_behind_mirror_nothing() {
+    let lean = [-(0.6_f32.sin()), 0.0, 0.6_f32.cos(), 1.0];
+    let camera = CameraParams::perspective(1.0, 1.0, 0.1);
+    let settings = Ssr {
+        thickness: 3.0,
+        ..PLAIN
+    };
+    let hits = |normal: [f32; 4]| {
+        let (depth, normals) = mirror_behind_a_wall(32, 1.0, 0.1, normal);
+        marched(&depth, &normals, &camera, &settings)
+            .iter()
+            .filter(|texel| texel[2] > 0.0)
+            .count()
+    };
+    assert!(hits(lean) > 100);
+    // The same plane with its normal turned over, and with none.
+    assert_eq!(hits([-lean[0], 0.0, -lean[2], 1.0]), 0);
+    assert_eq!(hits([0.0; 4]), 0);
 }

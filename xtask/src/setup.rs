@@ -76,10 +76,15 @@ impl fmt::Display for Invocation {
 #[must_use]
 pub fn invocations(root: bool) -> Vec<Invocation> {
     let packages: Vec<&str> = PACKAGES.iter().map(|(name, _)| *name).collect();
-    let install = ["install", "--yes", "--no-install-recommends"]
-        .into_iter()
-        .chain(packages)
-        .collect();
+    let install = [
+        "install",
+        "--yes",
+        "--no-upgrade",
+        "--no-install-recommends",
+    ]
+    .into_iter()
+    .chain(packages)
+    .collect();
     [vec!["update"], install]
         .into_iter()
         .map(|arguments: Vec<&str>| {

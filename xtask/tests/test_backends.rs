@@ -184,6 +184,44 @@ fn the_interpreter_alone_is_enough_if_nothing_else_is_required() {
 }
 
 #[test]
+fn a_frame_from_a_file_is_as_good_as_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("frame.exr");
+    let size = etalon_scenes::FrameSize::new(32, 18).unwrap();
+    let frame = etalon_scenes::scene("mirror-planes")
+        .unwrap()
+        .frame(size)
+        .unwrap();
+    etalon_scenes::exr_frame::save_exr(&frame, &path).unwrap();
+    let json = folder.path().join("report.json");
+    let output = Command::new(env!("CARGO_BIN_EXE_xtask"))
+        .args(["test-backends", "--require", "cpu", "--input"])
+        .arg(&path)
+        .arg("--json")
+        .arg(&json)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stdout)
+    );
+    let report: Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
+    assert_eq!(
+        report["settings"]["scenes"],
+        serde_json::json!(["frame.exr"])
+    );
+    assert_eq!(
+        (&report["settings"]["width"], &report["settings"]["height"]),
+        (&32.into(), &18.into())
+    );
+    assert_eq!(
+        (&report["runs"][0]["executor"], &report["runs"][0]["status"]),
+        (&"cpu".into(), &"ran".into())
+    );
+}
+
+#[test]
 fn mistakes_on_the_command_line_are_explained() {
     for (arguments, message) in [
         (

@@ -16,6 +16,7 @@ pub(super) fn render(report: &Report) -> String {
     let mut body = String::new();
     header(&mut body, report);
     executors(&mut body, report);
+    contents(&mut body, report);
     for (number, case) in report.cases().into_iter().enumerate() {
         section(&mut body, report, case, number);
     }
@@ -114,6 +115,28 @@ fn executors(body: &mut String, report: &Report) {
     body.push_str("</tbody>\n</table></div>\n</section>\n");
 }
 
+/// Links to the cases.
+fn contents(body: &mut String, report: &Report) {
+    body.push_str("<nav>\n<h2>Cases</h2>\n<ul>\n");
+    for (number, case) in report.cases().into_iter().enumerate() {
+        let passed = report
+            .comparisons_of(case)
+            .all(|comparison| comparison.verdict.passed());
+        let compared = report.comparisons_of(case).count();
+        let verdict = if compared == 0 {
+            "<span class=\"muted\">nothing to compare</span>"
+        } else {
+            badge(passed)
+        };
+        let _ = writeln!(
+            body,
+            "<li><a href=\"#case-{number}\">{}</a> {verdict}</li>",
+            escape(&case.to_string())
+        );
+    }
+    body.push_str("</ul>\n</nav>\n");
+}
+
 /// All comparisons of one output: the same pass and binding in one case.
 struct Output<'a> {
     id: String,
@@ -163,10 +186,16 @@ fn outputs<'a>(report: &'a Report, case: &'a Case, number: usize) -> Vec<Output<
 /// One scene in one arithmetic.
 fn section(body: &mut String, report: &Report, case: &Case, number: usize) {
     let outputs = outputs(report, case, number);
-    let _ = writeln!(body, "<section>\n<h2>{}</h2>", escape(&case.to_string()));
+    let _ = writeln!(
+        body,
+        "<section>\n<h2 id=\"case-{number}\">{}</h2>",
+        escape(&case.to_string())
+    );
     overview(body, report, case, &outputs);
-    for output in &outputs {
-        details(body, output);
+    for (position, output) in outputs.iter().enumerate() {
+        // What went wrong is to be seen at once, and what came out in the end.
+        let open = !output.passed() || position + 1 == outputs.len();
+        details(body, output, open);
     }
     body.push_str("</section>\n");
 }
@@ -184,7 +213,7 @@ fn overview(body: &mut String, report: &Report, case: &Case, outputs: &[Output<'
     body.push_str(
         "<div class=\"scroll\"><table>\n<caption>The largest figures of all pairs and frames; times in milliseconds \
          of the last frame.</caption>\n<thead><tr><th scope=\"col\">Pass</th><th scope=\"col\">Output</th>\
-         <th scope=\"col\">Shape</th>",
+         <th scope=\"col\">Shape</th><th scope=\"col\">Verdict</th>",
     );
     for heading in ["Max ULP", "Mean ULP", "Differing", "FLIP"] {
         let _ = write!(body, "<th scope=\"col\" class=\"figure\">{heading}</th>");
@@ -193,10 +222,11 @@ fn overview(body: &mut String, report: &Report, case: &Case, outputs: &[Output<'
         let _ = write!(
             body,
             "<th scope=\"col\" class=\"figure\">{}</th>",
-            escape(id)
+            // A place to break the line.
+            escape(id).replace('/', "/<wbr>")
         );
     }
-    body.push_str("<th scope=\"col\">Verdict</th></tr></thead>\n<tbody>\n");
+    body.push_str("</tr></thead>\n<tbody>\n");
     for output in outputs {
         let Some(first) = output.comparisons.first() else {
             continue;
@@ -208,12 +238,13 @@ fn overview(body: &mut String, report: &Report, case: &Case, outputs: &[Output<'
         };
         let _ = write!(
             body,
-            "<tr{class} data-differs=\"{}\"><th scope=\"row\"><a href=\"#{}\">{}</a></th><td>{}</td><td>{}</td>",
+            "<tr{class} data-differs=\"{}\"><th scope=\"row\"><a href=\"#{}\">{}</a></th><td>{}</td><td class=\"whole\">{}</td><td>{}</td>",
             output.differs(),
             output.id,
             escape(&first.pass),
             escape(&first.binding),
             escape(&first.shape),
+            badge(output.passed()),
         );
         for figure in super::table::worst_of(&output.comparisons) {
             let _ = write!(body, "<td class=\"figure\">{}</td>", escape(&figure));
@@ -226,14 +257,14 @@ fn overview(body: &mut String, report: &Report, case: &Case, outputs: &[Output<'
                 time.map_or_else(|| "–".to_owned(), |time| milliseconds(time.nanoseconds))
             );
         }
-        let _ = writeln!(body, "<td>{}</td></tr>", badge(output.passed()));
+        body.push_str("</tr>\n");
     }
-    body.push_str("</tbody>\n<tfoot><tr><th scope=\"row\" colspan=\"7\">All passes</th>");
+    body.push_str("</tbody>\n<tfoot><tr><th scope=\"row\" colspan=\"8\">All passes</th>");
     for (id, _) in &ran {
         let total = total_time(report, case, id).map_or_else(|| "–".to_owned(), milliseconds);
         let _ = write!(body, "<td class=\"figure\">{total}</td>");
     }
-    body.push_str("<td></td></tr></tfoot>\n</table></div>\n");
+    body.push_str("</tr></tfoot>\n</table></div>\n");
 }
 
 fn badge(passed: bool) -> &'static str {
@@ -245,7 +276,7 @@ fn badge(passed: bool) -> &'static str {
 }
 
 /// One output: pictures, slider, figures.
-fn details(body: &mut String, output: &Output<'_>) {
+fn details(body: &mut String, output: &Output<'_>, open: bool) {
     let Some(first) = output.comparisons.first() else {
         return;
     };
@@ -255,7 +286,7 @@ fn details(body: &mut String, output: &Output<'_>) {
          <span class=\"muted\">{}</span> {}</summary>\n<div>",
         output.id,
         output.differs(),
-        if output.passed() { "" } else { " open" },
+        if open { " open" } else { "" },
         escape(&first.pass),
         escape(&first.binding),
         escape(&first.shape),

@@ -116,7 +116,7 @@ fn the_page_runs_without_errors_and_its_slider_works() {
     );
     assert_eq!(found["clip"], "inset(0px 0px 0px 25%)", "{found}");
     assert_eq!(found["shown"], true, "{found}");
-    assert_eq!(found["opened"], serde_json::json!([1, 3]), "{found}");
+    assert_eq!(found["opened"], serde_json::json!([2, 3]), "{found}");
     assert_eq!(found["visible"], 1, "{found}");
     assert_eq!(found["broken"], 0, "{found}");
 }

@@ -17,6 +17,7 @@ use crate::open::{WgpuOptions, open};
 use crate::prepare::{Pipelines, Prepared, PreparedStep};
 use crate::record::{prepare_steps, record};
 use crate::staging::Staging;
+use crate::timing::Timing;
 
 /// How many prepared plans are kept.
 ///
@@ -51,7 +52,7 @@ impl WgpuBackend {
     ///
     /// With [`TIMESTAMP_QUERY`](wgpu::Features::TIMESTAMP_QUERY) and
     /// [`TIMESTAMP_QUERY_INSIDE_ENCODERS`](wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
-    /// executions are timed; with
+    /// executions are timed by the device, if it is not a software one; with
     /// [`PASSTHROUGH_SHADERS`](wgpu::Features::PASSTHROUGH_SHADERS) on Vulkan
     /// strict arithmetic is kept; with
     /// [`TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES`](wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES),
@@ -245,7 +246,7 @@ impl WgpuBackend {
                 staging.record(encoder, staged, uniforms, bytes);
             }
             let timing = match &prepared.offline {
-                Some(offline) if timed => offline.timing.as_ref(),
+                Some(offline) if timed => Some(&offline.timing),
                 _ => None,
             };
             record(encoder, gpu, plan, prepared, &physicals, timing);
@@ -306,11 +307,11 @@ impl WgpuBackend {
         let Some(prepared) = self.prepared.first() else {
             return Ok(Execution::default());
         };
-        let timing = prepared
-            .offline
-            .as_ref()
-            .and_then(|offline| offline.timing.as_ref());
-        let times = timing.map(|timing| (timing, timing.map(&self.gpu)));
+        let timing = prepared.offline.as_ref().map(|offline| &offline.timing);
+        let times = match timing {
+            Some(Timing::Device(queries)) => Some((queries, queries.map(&self.gpu))),
+            _ => None,
+        };
         let mut readbacks = Vec::new();
         for (planned, step) in plan.steps.iter().zip(&prepared.steps) {
             if let (
@@ -340,8 +341,10 @@ impl WgpuBackend {
                 data: readback.read(mapped)?,
             });
         }
-        if let Some((timing, mapped)) = times {
-            execution.times = timing.read(&self.gpu, &plan.steps, mapped)?;
+        if let Some((queries, mapped)) = times {
+            execution.times = queries.read(&self.gpu, &plan.steps, mapped)?;
+        } else if let Some(Timing::Host(clock)) = timing {
+            execution.times = clock.read();
         }
         Ok(execution)
     }

@@ -136,11 +136,25 @@ impl Gpu {
             && self.features.contains(wgpu::Features::PASSTHROUGH_SHADERS)
     }
 
-    /// Whether time can be told around any command.
+    /// Whether the device's own clock tells the time around any command.
     pub(crate) fn tells_time(&self) -> bool {
-        self.features.contains(
-            wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS,
-        )
+        let queries =
+            wgpu::Features::TIMESTAMP_QUERY | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS;
+        self.features.contains(queries)
+            && self.device.adapter_info().device_type != wgpu::DeviceType::Cpu
+    }
+
+    /// Runs what an encoder has recorded so far and waits for it; the encoder
+    /// begins anew. What goes wrong shows in the error scope or the next wait.
+    pub(crate) fn flush(&self, encoder: &mut wgpu::CommandEncoder) {
+        let next = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor {
+                label: Some("etalon"),
+            });
+        let recorded = std::mem::replace(encoder, next);
+        self.queue.submit([recorded.finish()]);
+        let _ = self.wait();
     }
 
     /// The loss of the device, if it has been noticed.

@@ -80,7 +80,7 @@ pub(crate) enum PreparedStep {
 pub(crate) struct Offline {
     /// By index of the resource.
     pub(crate) imports: BTreeMap<u32, Import>,
-    pub(crate) timing: Option<Timing>,
+    pub(crate) timing: Timing,
 }
 
 /// Everything for one structure.

@@ -63,7 +63,8 @@ fn empty(groups: &Groups) -> bool {
 }
 
 /// Records every step. Without `timing`, dispatches that follow each other
-/// share a pass; with it, each has one of its own, whose time is taken.
+/// share a pass; with it, each has one of its own, whose time is taken. Timing
+/// by the host submits and waits for what is recorded.
 pub(crate) fn record(
     encoder: &mut wgpu::CommandEncoder,
     gpu: &Gpu,
@@ -78,12 +79,20 @@ pub(crate) fn record(
         physicals,
     };
     match timing {
-        Some(timing) => {
-            let stamps = timing.stamps(&plan.steps);
+        Some(Timing::Device(queries)) => {
+            let stamps = queries.stamps(&plan.steps);
             for ((planned, step), stamp) in plan.steps.iter().zip(&prepared.steps).zip(stamps) {
                 recorder.timed(encoder, planned, step, stamp);
             }
-            timing.record(encoder);
+            queries.record(encoder);
+        }
+        Some(Timing::Host(clock)) => {
+            clock.restart();
+            for (planned, step) in plan.steps.iter().zip(&prepared.steps) {
+                clock.time(gpu, encoder, planned, |encoder| {
+                    recorder.timed(encoder, planned, step, None);
+                });
+            }
         }
         None => {
             let mut steps = plan.steps.iter().zip(&prepared.steps).peekable();
@@ -126,7 +135,7 @@ impl Recorder<'_> {
         }
     }
 
-    /// One step between two timestamps.
+    /// One step, between two timestamps if there are any.
     fn timed(
         &self,
         encoder: &mut wgpu::CommandEncoder,

@@ -1,4 +1,13 @@
 //! How long each step takes.
+//!
+//! By the device's own clock where that can be trusted. Software devices run
+//! commands as they please between two timestamps of wgpu, which have no barrier
+//! about them: lavapipe reports microseconds for passes that take half a second.
+//! There, and where there are no timestamps, each step is submitted on its own
+//! and waited for, and the host's clock tells.
+
+use std::cell::RefCell;
+use std::time::Instant;
 
 use etalon_core::backend::{BackendError, StepTime};
 use etalon_core::plan::{PlannedStep, Step};
@@ -10,9 +19,55 @@ use crate::tally::Owned;
 /// Queries of one set: WebGPU's maximum.
 const SET: u32 = wgpu::QUERY_SET_MAX_QUERIES;
 
+/// How the steps of a plan are timed.
+#[derive(Debug)]
+pub(crate) enum Timing {
+    /// By the device.
+    Device(Queries),
+    /// By the host.
+    Host(Clock),
+}
+
+/// The host's clock around each step that does something on the device.
+#[derive(Debug, Default)]
+pub(crate) struct Clock(RefCell<Vec<StepTime>>);
+
+impl Clock {
+    /// Forgets the times of the last run.
+    pub(crate) fn restart(&self) {
+        self.0.borrow_mut().clear();
+    }
+
+    /// Runs everything recorded so far and then what `record` records, and
+    /// keeps the time of the latter.
+    pub(crate) fn time(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        step: &PlannedStep,
+        record: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) {
+        gpu.flush(encoder);
+        let start = Instant::now();
+        record(encoder);
+        if timed(step) {
+            gpu.flush(encoder);
+            self.0.borrow_mut().push(StepTime {
+                step: step.name.clone(),
+                nanoseconds: u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX),
+            });
+        }
+    }
+
+    /// The times of the last run.
+    pub(crate) fn read(&self) -> Vec<StepTime> {
+        self.0.borrow().clone()
+    }
+}
+
 /// Two timestamps for each step that does something on the device.
 #[derive(Debug)]
-pub(crate) struct Timing {
+pub(crate) struct Queries {
     sets: Vec<wgpu::QuerySet>,
     queries: u32,
     resolved: Owned<wgpu::Buffer>,
@@ -53,13 +108,25 @@ fn timed(step: &PlannedStep) -> bool {
 }
 
 impl Timing {
-    /// Prepares to time these steps; `None` if the device cannot tell.
-    pub(crate) fn new(gpu: &Gpu, steps: &[PlannedStep]) -> Result<Option<Self>, BackendError> {
+    /// Prepares to time these steps.
+    pub(crate) fn new(gpu: &Gpu, steps: &[PlannedStep]) -> Result<Self, BackendError> {
+        let queries = if gpu.tells_time() {
+            Queries::new(gpu, steps)?
+        } else {
+            None
+        };
+        Ok(queries.map_or_else(|| Self::Host(Clock::default()), Self::Device))
+    }
+}
+
+impl Queries {
+    /// Timestamps for these steps; `None` if there are none or too many.
+    fn new(gpu: &Gpu, steps: &[PlannedStep]) -> Result<Option<Self>, BackendError> {
         let count = steps.iter().filter(|step| timed(step)).count();
         let Some(queries) = u32::try_from(count)
             .ok()
             .and_then(|count| count.checked_mul(2))
-            .filter(|queries| *queries > 0 && gpu.tells_time())
+            .filter(|queries| *queries > 0)
         else {
             return Ok(None);
         };

@@ -60,77 +60,77 @@ impl UniformValue {
     /// Whether the value has the type of a member.
     pub(crate) fn fits(&self, ty: &UniformType) -> bool {
         use UniformScalar::{F32, I32, U32};
-        match (self, ty) {
+        matches!(
+            (self, ty),
             (Self::F32(_), UniformType::Scalar(F32))
-            | (Self::I32(_), UniformType::Scalar(I32))
-            | (Self::U32(_), UniformType::Scalar(U32))
-            | (
-                Self::Vec2(_),
-                UniformType::Vector {
-                    scalar: F32,
-                    size: 2,
-                },
-            )
-            | (
-                Self::Vec3(_),
-                UniformType::Vector {
-                    scalar: F32,
-                    size: 3,
-                },
-            )
-            | (
-                Self::Vec4(_),
-                UniformType::Vector {
-                    scalar: F32,
-                    size: 4,
-                },
-            )
-            | (
-                Self::IVec2(_),
-                UniformType::Vector {
-                    scalar: I32,
-                    size: 2,
-                },
-            )
-            | (
-                Self::IVec4(_),
-                UniformType::Vector {
-                    scalar: I32,
-                    size: 4,
-                },
-            )
-            | (
-                Self::UVec2(_),
-                UniformType::Vector {
-                    scalar: U32,
-                    size: 2,
-                },
-            )
-            | (
-                Self::UVec4(_),
-                UniformType::Vector {
-                    scalar: U32,
-                    size: 4,
-                },
-            )
-            | (
-                Self::Mat3(_),
-                UniformType::Matrix {
-                    columns: 3,
-                    rows: 3,
-                    ..
-                },
-            )
-            | (
-                Self::Mat4(_),
-                UniformType::Matrix {
-                    columns: 4,
-                    rows: 4,
-                    ..
-                },
-            ) => true,
-            _ => false,
-        }
+                | (Self::I32(_), UniformType::Scalar(I32))
+                | (Self::U32(_), UniformType::Scalar(U32))
+                | (
+                    Self::Vec2(_),
+                    UniformType::Vector {
+                        scalar: F32,
+                        size: 2,
+                    },
+                )
+                | (
+                    Self::Vec3(_),
+                    UniformType::Vector {
+                        scalar: F32,
+                        size: 3,
+                    },
+                )
+                | (
+                    Self::Vec4(_),
+                    UniformType::Vector {
+                        scalar: F32,
+                        size: 4,
+                    },
+                )
+                | (
+                    Self::IVec2(_),
+                    UniformType::Vector {
+                        scalar: I32,
+                        size: 2,
+                    },
+                )
+                | (
+                    Self::IVec4(_),
+                    UniformType::Vector {
+                        scalar: I32,
+                        size: 4,
+                    },
+                )
+                | (
+                    Self::UVec2(_),
+                    UniformType::Vector {
+                        scalar: U32,
+                        size: 2,
+                    },
+                )
+                | (
+                    Self::UVec4(_),
+                    UniformType::Vector {
+                        scalar: U32,
+                        size: 4,
+                    },
+                )
+                | (
+                    Self::Mat3(_),
+                    UniformType::Matrix {
+                        columns: 3,
+                        rows: 3,
+                        ..
+                    },
+                )
+                | (
+                    Self::Mat4(_),
+                    UniformType::Matrix {
+                        columns: 4,
+                        rows: 4,
+                        ..
+                    },
+                )
+        )
     }
 
     /// Writes the value's bytes as WGSL lays them out (WGSL §14.4.1: columns of

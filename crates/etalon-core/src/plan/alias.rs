@@ -153,15 +153,16 @@ impl Heap {
             }
             return Some((offset, tenants));
         }
-        // Grow, from the last block if that is free.
+        // Grow, from the last block if that is free. Whoever used the added
+        // bytes did so in an earlier run, in any way.
         let last = self
             .blocks
             .last_key_value()
-            .map(|(offset, block)| (*offset, *block));
+            .map(|(offset, (size, _))| (*offset, *size));
         let (offset, tenants) = match last {
-            Some((offset, (size, tenants))) if offset + size == self.size => {
+            Some((offset, size)) if offset + size == self.size => {
                 self.remove(offset)?;
-                (offset, tenants)
+                (offset, UsageSet::ALL)
             }
             _ => (self.size, UsageSet::EMPTY),
         };

@@ -2,15 +2,15 @@
 //!
 //! Planning is one function made of named phases, each a module of its own:
 //!
-//! 1. [`cull`]: what no output asks for goes, transitively.
-//! 2. [`bind`]: the kernels of what is left are compiled (or found compiled),
+//! 1. `cull`: what no output asks for goes, transitively.
+//! 2. `bind`: the kernels of what is left are compiled (or found compiled),
 //!    their reflection is held against the declaration, uniform blocks are
 //!    packed and workgroups counted.
-//! 3. [`order`]: passes are put in an order that respects every version, and
+//! 3. `order`: passes are put in an order that respects every version, and
 //!    that does not depend on the order in which unrelated effects were added.
-//! 4. [`lifetime`]: when each resource is first and last used.
-//! 5. [`alias`]: transient resources that live at different times share memory.
-//! 6. [`barrier`]: what must be waited for and made visible before each pass.
+//! 4. `lifetime`: when each resource is first and last used.
+//! 5. `alias`: transient resources that live at different times share memory.
+//! 6. `barrier`: what must be waited for and made visible before each pass.
 //!
 //! The result is plain data: printable, comparable, serialisable to JSON, the
 //! same for the same input. A backend may not reorder, add or drop work.
@@ -192,6 +192,9 @@ pub struct UsageSet(u8);
 impl UsageSet {
     /// The empty set.
     pub const EMPTY: Self = Self(0);
+
+    /// Every usage there is.
+    pub const ALL: Self = Self((1 << Usage::ALL.len()) - 1);
 
     /// The set with `usage` in it.
     #[must_use]

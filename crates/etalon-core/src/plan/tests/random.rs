@@ -14,7 +14,7 @@ use proptest::prelude::*;
 use super::{R32, library, plan_with};
 use crate::graph::{ClearValue, Graph, ResourceDesc, Texture};
 use crate::kernel::KernelLibrary;
-use crate::plan::{Bound, Capture, Plan, ResourceKind, Step, Usage};
+use crate::plan::{Bound, Capture, Plan, PlannedResource, ResourceKind, Step, Usage, UsageSet};
 
 fn symbol(parts: impl Hash) -> u64 {
     let mut hasher = DefaultHasher::new();
@@ -377,6 +377,7 @@ fn check_layout(plan: &Plan, resource: u32, mip: u32, uses: &[Touch]) {
 
 /// The first use of memory must wait for its former tenants' uses.
 fn check_aliases(plan: &Plan, touches: &HashMap<(u32, u32), Vec<Touch>>) {
+    check_first_tenants(plan, touches);
     for (a, first) in plan.resources.iter().enumerate() {
         for (b, second) in plan.resources.iter().enumerate() {
             let (ResourceKind::Transient(p), ResourceKind::Transient(q)) =
@@ -424,6 +425,49 @@ fn check_aliases(plan: &Plan, touches: &HashMap<(u32, u32), Vec<Touch>>) {
                     }
                 }
             }
+        }
+    }
+}
+
+/// The first tenant of a byte must wait for whatever an earlier run did to it.
+fn check_first_tenants(plan: &Plan, touches: &HashMap<(u32, u32), Vec<Touch>>) {
+    let place = |resource: &PlannedResource| match &resource.kind {
+        ResourceKind::Transient(place) => Some(place.offset..place.offset + place.bytes),
+        _ => None,
+    };
+    for (index, resource) in plan.resources.iter().enumerate() {
+        let Some(bytes) = place(resource) else {
+            continue;
+        };
+        let mut before: Vec<_> = plan
+            .resources
+            .iter()
+            .filter(|other| other.last < resource.first)
+            .filter_map(place)
+            .collect();
+        before.sort_by_key(|bytes| bytes.start);
+        let covered = before.iter().fold(bytes.start, |covered, other| {
+            if other.start <= covered {
+                covered.max(other.end)
+            } else {
+                covered
+            }
+        });
+        if covered >= bytes.end {
+            continue;
+        }
+        let uses = (0..2).filter_map(|mip| touches.get(&(index as u32, mip)));
+        for first in uses.filter_map(|uses| uses.first()) {
+            let barriers = plan.steps[first.step].barriers.iter();
+            let barrier = barriers
+                .filter(|barrier| barrier.resource == index as u32 && barrier.layout.is_none())
+                .last();
+            let from = barrier.map(|barrier| barrier.from);
+            assert!(
+                from.is_some_and(|from| from.is_empty() || from == UsageSet::ALL),
+                "{} does not wait for earlier runs: {from:?}",
+                resource.name
+            );
         }
     }
 }

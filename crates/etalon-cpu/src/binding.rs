@@ -1,6 +1,9 @@
 //! What a kernel needs bound.
 
-use naga::{AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess, StorageFormat, TypeInner};
+use naga::{
+    AddressSpace, GlobalVariable, ImageClass, ImageDimension, Module, ScalarKind, StorageAccess,
+    StorageFormat, TypeInner,
+};
 
 use etalon_core::Format;
 
@@ -84,34 +87,64 @@ impl BindingInfo {
     /// Whether the kernel may write what is bound.
     #[must_use]
     pub fn is_writable(&self) -> bool {
-        matches!(self.kind, BindingKind::Storage { writable: true, .. } | BindingKind::StorageTexture { writable: true, .. })
+        matches!(
+            self.kind,
+            BindingKind::Storage { writable: true, .. }
+                | BindingKind::StorageTexture { writable: true, .. }
+        )
     }
 }
 
 /// The layout of a resource variable.
-pub(crate) fn describe_binding(module: &Module, global: &GlobalVariable) -> Result<BindingInfo, Fail> {
-    let name = global.name.clone().unwrap_or_else(|| "(unnamed)".to_owned());
+pub(crate) fn describe_binding(
+    module: &Module,
+    global: &GlobalVariable,
+) -> Result<BindingInfo, Fail> {
+    let name = global
+        .name
+        .clone()
+        .unwrap_or_else(|| "(unnamed)".to_owned());
     let Some(binding) = global.binding else {
-        return Err(Fail::invalid(format!("the resource `{name}` has no @group and @binding")));
+        return Err(Fail::invalid(format!(
+            "the resource `{name}` has no @group and @binding"
+        )));
     };
     let ty = &module.types[global.ty].inner;
     let kind = match (global.space, ty) {
-        (AddressSpace::Uniform, _) => BindingKind::Uniform { size: ty.size(module.to_ctx()) },
+        (AddressSpace::Uniform, _) => BindingKind::Uniform {
+            size: ty.size(module.to_ctx()),
+        },
         // naga counts one element of a runtime-sized array.
-        (AddressSpace::Storage { access }, _) => BindingKind::Storage { min_size: ty.size(module.to_ctx()), writable: access.contains(StorageAccess::STORE) },
+        (AddressSpace::Storage { access }, _) => BindingKind::Storage {
+            min_size: ty.size(module.to_ctx()),
+            writable: access.contains(StorageAccess::STORE),
+        },
         (_, TypeInner::Sampler { comparison: false }) => BindingKind::Sampler,
-        (_, TypeInner::Sampler { comparison: true }) => return Err(Fail::unsupported("comparison samplers")),
-        (_, &TypeInner::Image { dim, arrayed, class }) => {
+        (_, TypeInner::Sampler { comparison: true }) => {
+            return Err(Fail::unsupported("comparison samplers"));
+        }
+        (
+            _,
+            &TypeInner::Image {
+                dim,
+                arrayed,
+                class,
+            },
+        ) => {
             let view = match (dim, arrayed) {
                 (ImageDimension::D2, false) => View::D2,
                 (ImageDimension::D2, true) => View::D2Array,
                 (ImageDimension::D3, _) => View::D3,
                 (ImageDimension::Cube, false) => View::Cube,
                 (ImageDimension::Cube, true) => View::CubeArray,
-                (ImageDimension::D1, _) => return Err(Fail::unsupported("one-dimensional textures")),
+                (ImageDimension::D1, _) => {
+                    return Err(Fail::unsupported("one-dimensional textures"));
+                }
             };
             match class {
-                ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => return Err(Fail::unsupported("multisampled textures")),
+                ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => {
+                    return Err(Fail::unsupported("multisampled textures"));
+                }
                 ImageClass::Sampled { kind, .. } => BindingKind::Texture {
                     view,
                     kind: match kind {
@@ -120,19 +153,31 @@ pub(crate) fn describe_binding(module: &Module, global: &GlobalVariable) -> Resu
                         _ => ChannelKind::Float,
                     },
                 },
-                ImageClass::Depth { .. } => BindingKind::Texture { view, kind: ChannelKind::Float },
+                ImageClass::Depth { .. } => BindingKind::Texture {
+                    view,
+                    kind: ChannelKind::Float,
+                },
                 ImageClass::External => return Err(Fail::unsupported("external textures")),
                 ImageClass::Storage { format, access } => {
                     if access.contains(StorageAccess::ATOMIC) {
                         return Err(Fail::unsupported("atomic operations on textures"));
                     }
-                    BindingKind::StorageTexture { view, format: storage_format(format)?, writable: access.contains(StorageAccess::STORE) }
+                    BindingKind::StorageTexture {
+                        view,
+                        format: storage_format(format)?,
+                        writable: access.contains(StorageAccess::STORE),
+                    }
                 }
             }
         }
         _ => return Err(Fail::unsupported(format!("resources like `{name}`"))),
     };
-    Ok(BindingInfo { name, group: binding.group, binding: binding.binding, kind })
+    Ok(BindingInfo {
+        name,
+        group: binding.group,
+        binding: binding.binding,
+        kind,
+    })
 }
 
 fn storage_format(format: StorageFormat) -> Result<Format, Fail> {
@@ -171,6 +216,10 @@ fn storage_format(format: StorageFormat) -> Result<Format, Fail> {
         S::Rgba32Uint => Format::Rgba32Uint,
         S::Rgba32Sint => Format::Rgba32Sint,
         S::Rgba32Float => Format::Rgba32Float,
-        other => return Err(Fail::unsupported(format!("storage textures of format {other:?}"))),
+        other => {
+            return Err(Fail::unsupported(format!(
+                "storage textures of format {other:?}"
+            )));
+        }
     })
 }

@@ -76,17 +76,30 @@ pub(crate) struct Code {
 
 impl Code {
     pub(crate) fn new(flat: &Flat, allocation: &Allocation) -> Result<Self, Fail> {
-        let files = [allocation.varying_float, allocation.varying_int, allocation.uniform_float, allocation.uniform_int];
+        let files = [
+            allocation.varying_float,
+            allocation.varying_int,
+            allocation.uniform_float,
+            allocation.uniform_int,
+        ];
         for size in files {
             if size > u32::from(u16::MAX) {
-                return Err(Fail::TooLarge { what: "number of registers", size: size.into(), limit: u16::MAX.into() });
+                return Err(Fail::TooLarge {
+                    what: "number of registers",
+                    size: size.into(),
+                    limit: u16::MAX.into(),
+                });
             }
         }
         let slot = |reg: Reg| {
             let info = flat.regs[reg.0 as usize];
             // Checked above; registers that are mentioned have numbers.
             let number = allocation.numbers[reg.0 as usize].unwrap_or(0) as u16;
-            Slot { class: info.class, varying: info.varying, number }
+            Slot {
+                class: info.class,
+                varying: info.varying,
+                number,
+            }
         };
         let inst = |inst: &FlatInst| CodeInst {
             op: inst.op,
@@ -95,7 +108,12 @@ impl Code {
             mask: inst.mask.map(slot),
             span: inst.span,
         };
-        let mut code = Self { loops: flat.loops.clone(), resources: flat.resources.clone(), files, ..Self::default() };
+        let mut code = Self {
+            loops: flat.loops.clone(),
+            resources: flat.resources.clone(),
+            files,
+            ..Self::default()
+        };
         code.insts.extend(flat.prologue.iter().map(inst));
         code.prologue = code.insts.len() as u32;
         for block in &flat.blocks {
@@ -104,13 +122,31 @@ impl Code {
             let at = |block: BlockId| block.0;
             let end = match block.end {
                 Terminator::Jump(next) => End::Jump(at(next)),
-                Terminator::Branch { condition, yes, no } => End::Branch { condition: slot(condition), yes: at(yes), no: at(no) },
-                Terminator::Any { mask, yes, no } => End::Any { mask: slot(mask), yes: at(yes), no: at(no) },
-                Terminator::Enter { counter, head } => End::Enter { counter, head: at(head) },
-                Terminator::Again { counter, head } => End::Again { counter, head: at(head) },
+                Terminator::Branch { condition, yes, no } => End::Branch {
+                    condition: slot(condition),
+                    yes: at(yes),
+                    no: at(no),
+                },
+                Terminator::Any { mask, yes, no } => End::Any {
+                    mask: slot(mask),
+                    yes: at(yes),
+                    no: at(no),
+                },
+                Terminator::Enter { counter, head } => End::Enter {
+                    counter,
+                    head: at(head),
+                },
+                Terminator::Again { counter, head } => End::Again {
+                    counter,
+                    head: at(head),
+                },
                 Terminator::End => End::Stop,
             };
-            code.blocks.push(CodeBlock { start, stop: code.insts.len() as u32, end });
+            code.blocks.push(CodeBlock {
+                start,
+                stop: code.insts.len() as u32,
+                end,
+            });
         }
         for (i, info) in flat.regs.iter().enumerate() {
             if let (Some(bits), Some(_)) = (info.constant, allocation.numbers[i]) {
@@ -122,7 +158,9 @@ impl Code {
 
     /// Whether a workgroup must run as one batch.
     pub(crate) fn needs_whole_workgroup(&self) -> bool {
-        self.resources.workgroup.float > 0 || self.resources.workgroup.int > 0 || self.insts.iter().any(|inst| inst.op == Op::Barrier)
+        self.resources.workgroup.float > 0
+            || self.resources.workgroup.int > 0
+            || self.insts.iter().any(|inst| inst.op == Op::Barrier)
     }
 
     /// Whether results may depend on the order in which workgroups run: an
@@ -130,7 +168,10 @@ impl Code {
     pub(crate) fn depends_on_order(&self) -> bool {
         use crate::ir::AtomicFunction as A;
         self.insts.iter().any(|inst| match inst.op {
-            Op::BufferAtomic { function, .. } => matches!(function, A::Exchange | A::CompareExchange) || inst.results.iter().any(Option::is_some),
+            Op::BufferAtomic { function, .. } => {
+                matches!(function, A::Exchange | A::CompareExchange)
+                    || inst.results.iter().any(Option::is_some)
+            }
             _ => false,
         })
     }
@@ -178,7 +219,9 @@ impl fmt::Display for Code {
             }
             match block.end {
                 End::Jump(next) => writeln!(f, "    jump {next}")?,
-                End::Branch { condition, yes, no } => writeln!(f, "    if {condition} jump {yes} else {no}")?,
+                End::Branch { condition, yes, no } => {
+                    writeln!(f, "    if {condition} jump {yes} else {no}")?
+                }
                 End::Any { mask, yes, no } => writeln!(f, "    any {mask} jump {yes} else {no}")?,
                 End::Enter { counter, head } => writeln!(f, "    enter loop {counter} at {head}")?,
                 End::Again { counter, head } => writeln!(f, "    repeat loop {counter} at {head}")?,

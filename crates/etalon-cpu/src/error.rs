@@ -79,7 +79,9 @@ pub enum RunError {
         limit: u32,
     },
     /// A barrier was reached by a part of a workgroup only.
-    #[error("{location}: a barrier of kernel {kernel} is in control flow that differs within a workgroup")]
+    #[error(
+        "{location}: a barrier of kernel {kernel} is in control flow that differs within a workgroup"
+    )]
     DivergentBarrier {
         /// The kernel.
         kernel: String,

@@ -45,9 +45,17 @@ pub(crate) fn locate_in(name: String, source: String) -> impl Fn(Span) -> Locati
     move |span| match span.to_range() {
         Some(range) if range.start <= source.len() && source.is_char_boundary(range.start) => {
             let place = span.location(&source);
-            Location { file: name.clone(), line: place.line_number, column: place.line_position }
+            Location {
+                file: name.clone(),
+                line: place.line_number,
+                column: place.line_position,
+            }
         }
-        _ => Location { file: name.clone(), line: 0, column: 0 },
+        _ => Location {
+            file: name.clone(),
+            line: 0,
+            column: 0,
+        },
     }
 }
 
@@ -57,8 +65,20 @@ impl Program {
     ///
     /// # Errors
     /// [`TranslateError`] if the kernel uses what the interpreter does not have.
-    pub fn from_module(name: &str, source: &str, module: &Module, info: &ModuleInfo, entry_point: &str) -> Result<Self, TranslateError> {
-        Self::new(name.to_owned(), Box::new(locate_in(name.to_owned(), source.to_owned())), module, info, entry_point)
+    pub fn from_module(
+        name: &str,
+        source: &str,
+        module: &Module,
+        info: &ModuleInfo,
+        entry_point: &str,
+    ) -> Result<Self, TranslateError> {
+        Self::new(
+            name.to_owned(),
+            Box::new(locate_in(name.to_owned(), source.to_owned())),
+            module,
+            info,
+            entry_point,
+        )
     }
 
     /// Translates a kernel.
@@ -69,31 +89,84 @@ impl Program {
         let source = Arc::clone(kernel);
         let locate = move |span| {
             let place = source.source_map.locate(span);
-            Location { file: place.file, line: place.line, column: place.column }
+            Location {
+                file: place.file,
+                line: place.line,
+                column: place.column,
+            }
         };
-        Self::new(kernel.name.clone(), Box::new(locate), &kernel.module, &kernel.info, &kernel.entry_point)
+        Self::new(
+            kernel.name.clone(),
+            Box::new(locate),
+            &kernel.module,
+            &kernel.info,
+            &kernel.entry_point,
+        )
     }
 
-    fn new(name: String, locate: Box<dyn Fn(Span) -> Location + Send + Sync>, module: &Module, info: &ModuleInfo, entry_point: &str) -> Result<Self, TranslateError> {
-        let Some(index) = module.entry_points.iter().position(|entry| entry.name == entry_point && entry.stage == ShaderStage::Compute) else {
-            return Err(TranslateError::NoEntryPoint { name, entry_point: entry_point.to_owned() });
+    fn new(
+        name: String,
+        locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
+        module: &Module,
+        info: &ModuleInfo,
+        entry_point: &str,
+    ) -> Result<Self, TranslateError> {
+        let Some(index) = module
+            .entry_points
+            .iter()
+            .position(|entry| entry.name == entry_point && entry.stage == ShaderStage::Compute)
+        else {
+            return Err(TranslateError::NoEntryPoint {
+                name,
+                entry_point: entry_point.to_owned(),
+            });
         };
         let workgroup_size = module.entry_points[index].workgroup_size;
         let explain = |(fail, span): (Fail, Span)| match fail {
-            Fail::Unsupported(construct) => TranslateError::Unsupported { construct, location: locate(span) },
-            Fail::Invalid(what) => TranslateError::Invalid { what, location: locate(span) },
-            Fail::TooLarge { what, size, limit } => TranslateError::TooLarge { name: name.clone(), what, size, limit },
+            Fail::Unsupported(construct) => TranslateError::Unsupported {
+                construct,
+                location: locate(span),
+            },
+            Fail::Invalid(what) => TranslateError::Invalid {
+                what,
+                location: locate(span),
+            },
+            Fail::TooLarge { what, size, limit } => TranslateError::TooLarge {
+                name: name.clone(),
+                what,
+                size,
+                limit,
+            },
         };
-        let invocations = workgroup_size.iter().try_fold(1_u32, |total, &size| total.checked_mul(size)).filter(|&total| total <= MAX_INVOCATIONS && total > 0);
+        let invocations = workgroup_size
+            .iter()
+            .try_fold(1_u32, |total, &size| total.checked_mul(size))
+            .filter(|&total| total <= MAX_INVOCATIONS && total > 0);
         let Some(invocations) = invocations else {
-            let size = workgroup_size.iter().fold(1_u64, |total, &size| total.saturating_mul(size.into()));
-            return Err(TranslateError::TooLarge { name, what: "number of invocations in a workgroup", size, limit: MAX_INVOCATIONS.into() });
+            let size = workgroup_size
+                .iter()
+                .fold(1_u64, |total, &size| total.saturating_mul(size.into()));
+            return Err(TranslateError::TooLarge {
+                name,
+                what: "number of invocations in a workgroup",
+                size,
+                limit: MAX_INVOCATIONS.into(),
+            });
         };
         let translation = translate::translate(module, info, index).map_err(&explain)?;
         let partial = invocations % crate::registers::LANES as u32 != 0;
         let flat = lower::lower(translation.tree, partial);
-        let code = Code::new(&flat, &lower::allocate(&flat)).map_err(|fail| explain((fail, Span::default())))?;
-        Ok(Self { name, workgroup_size, bindings: translation.bindings, code, local_ids: exec::LocalIds::new(workgroup_size), linked: Default::default(), locate })
+        let code = Code::new(&flat, &lower::allocate(&flat))
+            .map_err(|fail| explain((fail, Span::default())))?;
+        Ok(Self {
+            name,
+            workgroup_size,
+            bindings: translation.bindings,
+            code,
+            local_ids: exec::LocalIds::new(workgroup_size),
+            linked: Default::default(),
+            locate,
+        })
     }
 
     /// The kernel's name.
@@ -121,7 +194,12 @@ impl Program {
     /// [`RunError::Binding`] if resources are missing or of the wrong kind; the
     /// other variants for what goes wrong while running, after which what the
     /// kernel writes is undefined.
-    pub fn dispatch(&self, executor: &Executor, workgroups: [u32; 3], resources: &[BoundResource<'_>]) -> Result<DispatchCounters, RunError> {
+    pub fn dispatch(
+        &self,
+        executor: &Executor,
+        workgroups: [u32; 3],
+        resources: &[BoundResource<'_>],
+    ) -> Result<DispatchCounters, RunError> {
         let mut bound = Vec::with_capacity(self.bindings.len());
         for (i, binding) in self.bindings.iter().enumerate() {
             bound.push(self.check(binding, resources.get(i))?);
@@ -129,32 +207,76 @@ impl Program {
         let tier = executor.tier();
         let linked = self.linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier));
         let invocations = self.workgroup_size.iter().product();
-        let job = exec::Job { code: &self.code, linked, resources: &bound, local_ids: &self.local_ids, invocations };
-        job.run(executor, workgroups).map_err(|failure| self.explain(failure, workgroups))
+        let job = exec::Job {
+            code: &self.code,
+            linked,
+            resources: &bound,
+            local_ids: &self.local_ids,
+            invocations,
+        };
+        job.run(executor, workgroups)
+            .map_err(|failure| self.explain(failure, workgroups))
     }
 
     fn explain(&self, failure: exec::DispatchFailure, [x, y, z]: [u32; 3]) -> RunError {
         let kernel = self.name.clone();
         match failure {
             exec::DispatchFailure::Failed(exec::Failure::EndlessLoop(index), limit) => {
-                let span = self.code.loops.get(index as usize).copied().unwrap_or_default();
-                RunError::EndlessLoop { kernel, location: (self.locate)(span), limit }
+                let span = self
+                    .code
+                    .loops
+                    .get(index as usize)
+                    .copied()
+                    .unwrap_or_default();
+                RunError::EndlessLoop {
+                    kernel,
+                    location: (self.locate)(span),
+                    limit,
+                }
             }
             exec::DispatchFailure::Failed(exec::Failure::DivergentBarrier(index), _) => {
-                let span = self.code.insts.get(index as usize).map(|inst| inst.span).unwrap_or_default();
-                RunError::DivergentBarrier { kernel, location: (self.locate)(span) }
+                let span = self
+                    .code
+                    .insts
+                    .get(index as usize)
+                    .map(|inst| inst.span)
+                    .unwrap_or_default();
+                RunError::DivergentBarrier {
+                    kernel,
+                    location: (self.locate)(span),
+                }
             }
-            exec::DispatchFailure::TooManyWorkgroups => RunError::TooManyWorkgroups { kernel, x, y, z },
-            exec::DispatchFailure::OutOfMemory(bytes) => RunError::OutOfMemory { what: format!("the registers of kernel {kernel}"), bytes },
+            exec::DispatchFailure::TooManyWorkgroups => {
+                RunError::TooManyWorkgroups { kernel, x, y, z }
+            }
+            exec::DispatchFailure::OutOfMemory(bytes) => RunError::OutOfMemory {
+                what: format!("the registers of kernel {kernel}"),
+                bytes,
+            },
         }
     }
 
-    fn check<'a>(&self, binding: &BindingInfo, resource: Option<&'a BoundResource<'a>>) -> Result<Resource<'a>, RunError> {
-        let mismatch = |expected: String, found: String| RunError::Binding { kernel: self.name.clone(), binding: binding.name.clone(), expected, found };
+    fn check<'a>(
+        &self,
+        binding: &BindingInfo,
+        resource: Option<&'a BoundResource<'a>>,
+    ) -> Result<Resource<'a>, RunError> {
+        let mismatch = |expected: String, found: String| RunError::Binding {
+            kernel: self.name.clone(),
+            binding: binding.name.clone(),
+            expected,
+            found,
+        };
         match (binding.kind, resource) {
-            (BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. }, Some(BoundResource::Buffer(buffer))) => {
+            (
+                BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. },
+                Some(BoundResource::Buffer(buffer)),
+            ) => {
                 if buffer.len() < need.into() {
-                    return Err(mismatch(format!("a buffer of at least {need} bytes"), format!("one of {} bytes", buffer.len())));
+                    return Err(mismatch(
+                        format!("a buffer of at least {need} bytes"),
+                        format!("one of {} bytes", buffer.len()),
+                    ));
                 }
                 Ok(Resource::Buffer(buffer.words(), buffer.len()))
             }
@@ -166,18 +288,29 @@ impl Program {
                     _ => ChannelKind::Float,
                 };
                 if !fits(view, desc.dimension) || found != kind {
-                    return Err(mismatch(format!("a {view:?} texture of kind {kind:?}"), format!("a {:?} texture of format {}", desc.dimension, desc.format)));
+                    return Err(mismatch(
+                        format!("a {view:?} texture of kind {kind:?}"),
+                        format!("a {:?} texture of format {}", desc.dimension, desc.format),
+                    ));
                 }
                 Ok(Resource::Texture(texture))
             }
-            (BindingKind::StorageTexture { view, format, .. }, Some(BoundResource::Texture(texture))) => {
+            (
+                BindingKind::StorageTexture { view, format, .. },
+                Some(BoundResource::Texture(texture)),
+            ) => {
                 let desc = texture.desc();
                 if !fits(view, desc.dimension) || desc.format != format {
-                    return Err(mismatch(format!("a {view:?} texture of format {format}"), format!("a {:?} texture of format {}", desc.dimension, desc.format)));
+                    return Err(mismatch(
+                        format!("a {view:?} texture of format {format}"),
+                        format!("a {:?} texture of format {}", desc.dimension, desc.format),
+                    ));
                 }
                 Ok(Resource::Texture(texture))
             }
-            (BindingKind::Sampler, Some(BoundResource::Sampler(sampler))) => Ok(Resource::Sampler(*sampler)),
+            (BindingKind::Sampler, Some(BoundResource::Sampler(sampler))) => {
+                Ok(Resource::Sampler(*sampler))
+            }
             (kind, found) => {
                 let expected = match kind {
                     BindingKind::Uniform { .. } | BindingKind::Storage { .. } => "a buffer",
@@ -221,6 +354,9 @@ impl fmt::Display for Program {
 
 impl fmt::Debug for Program {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Program").field("name", &self.name).field("instructions", &self.code.insts.len()).finish_non_exhaustive()
+        f.debug_struct("Program")
+            .field("name", &self.name)
+            .field("instructions", &self.code.insts.len())
+            .finish_non_exhaustive()
     }
 }

@@ -52,13 +52,20 @@ impl<'a, T> Others<'a, T> {
 
     #[inline(always)]
     fn all(file: &'a [Lanes<T>]) -> Self {
-        Self { before: file, after: &[] }
+        Self {
+            before: file,
+            after: &[],
+        }
     }
 
     /// The register `at`, which is not the one being written.
     #[inline(always)]
     pub(crate) fn get(&self, at: usize) -> &'a Lanes<T> {
-        if at < self.before.len() { &self.before[at] } else { &self.after[at - self.before.len() - 1] }
+        if at < self.before.len() {
+            &self.before[at]
+        } else {
+            &self.after[at - self.before.len() - 1]
+        }
     }
 }
 
@@ -136,5 +143,15 @@ macro_rules! class {
     };
 }
 
-class!(Float, N, floats, ints, uniform_floats, |bits| N::from_f32(f32::from_bits(bits)), |lane| lane.to_f32().to_bits());
-class!(Int, u32, ints, floats, uniform_ints, |bits| bits, |lane| lane);
+class!(
+    Float,
+    N,
+    floats,
+    ints,
+    uniform_floats,
+    |bits| N::from_f32(f32::from_bits(bits)),
+    |lane| lane.to_f32().to_bits()
+);
+class!(Int, u32, ints, floats, uniform_ints, |bits| bits, |lane| {
+    lane
+});

@@ -7,14 +7,74 @@ use common::*;
 
 /// Numbers at and around every boundary.
 const FLOATS: &[f32] = &[
-    0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 1.5, 2.5, -2.5, 3.0, 0.1, 7.25, -7.75, 100.625, 1e-3, 8_388_607.5, 8_388_609.0, 16_777_216.0, -16_777_217.0,
-    2_147_483_500.0, 2_147_483_648.0, -2_147_483_648.0, 4_294_967_040.0, 4_294_967_296.0, 1e20, -1e20, 3.4e38, f32::MAX, f32::MIN, f32::MIN_POSITIVE,
-    1e-40, -1e-45, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.999_999_94, 1.000_000_1, std::f32::consts::PI,
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    -0.5,
+    1.5,
+    2.5,
+    -2.5,
+    3.0,
+    0.1,
+    7.25,
+    -7.75,
+    100.625,
+    1e-3,
+    8_388_607.5,
+    8_388_609.0,
+    16_777_216.0,
+    -16_777_217.0,
+    2_147_483_500.0,
+    2_147_483_648.0,
+    -2_147_483_648.0,
+    4_294_967_040.0,
+    4_294_967_296.0,
+    1e20,
+    -1e20,
+    3.4e38,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e-40,
+    -1e-45,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+    0.999_999_94,
+    1.000_000_1,
+    std::f32::consts::PI,
 ];
 
 const INTS: &[u32] = &[
-    0, 1, 2, 3, 5, 7, 31, 32, 33, 63, 100, 255, 256, 0x7fff, 0x8000, 0xffff, 0x1_0000, 0x1234_5678, 0x7fff_fffe, 0x7fff_ffff, 0x8000_0000, 0x8000_0001,
-    0xdead_beef, 0xffff_0000, 0xffff_fffd, 0xffff_fffe, 0xffff_ffff,
+    0,
+    1,
+    2,
+    3,
+    5,
+    7,
+    31,
+    32,
+    33,
+    63,
+    100,
+    255,
+    256,
+    0x7fff,
+    0x8000,
+    0xffff,
+    0x1_0000,
+    0x1234_5678,
+    0x7fff_fffe,
+    0x7fff_ffff,
+    0x8000_0000,
+    0x8000_0001,
+    0xdead_beef,
+    0xffff_0000,
+    0xffff_fffd,
+    0xffff_fffe,
+    0xffff_ffff,
 ];
 
 /// Whether two words are the same number; NaNs are all alike.
@@ -23,12 +83,35 @@ fn same(a: u32, b: u32, float: bool) -> bool {
 }
 
 /// Checks `expression` of `a` and `b`, given as bits, on all pairs of `values`.
-fn check(expression: &str, operand: &str, result_is_float: bool, values: &[u32], expected: impl Fn(u32, u32) -> u32) {
-    check_if(expression, operand, result_is_float, values, expected, |_, _| true);
+fn check(
+    expression: &str,
+    operand: &str,
+    result_is_float: bool,
+    values: &[u32],
+    expected: impl Fn(u32, u32) -> u32,
+) {
+    check_if(
+        expression,
+        operand,
+        result_is_float,
+        values,
+        expected,
+        |_, _| true,
+    );
 }
 
-fn check_if(expression: &str, operand: &str, result_is_float: bool, values: &[u32], expected: impl Fn(u32, u32) -> u32, applies: impl Fn(u32, u32) -> bool) {
-    let pairs: Vec<(u32, u32)> = values.iter().flat_map(|&a| values.iter().map(move |&b| (a, b))).collect();
+fn check_if(
+    expression: &str,
+    operand: &str,
+    result_is_float: bool,
+    values: &[u32],
+    expected: impl Fn(u32, u32) -> u32,
+    applies: impl Fn(u32, u32) -> bool,
+) {
+    let pairs: Vec<(u32, u32)> = values
+        .iter()
+        .flat_map(|&a| values.iter().map(move |&b| (a, b)))
+        .collect();
     let uniform = pairs[pairs.len() / 3];
     let count = pairs.len();
     let wgsl = format!(
@@ -50,16 +133,27 @@ fn check_if(expression: &str, operand: &str, result_is_float: bool, values: &[u3
          }}",
         last = 2 * count,
     );
-    let data: Vec<u32> = pairs.iter().copied().chain([uniform]).flat_map(|(a, b)| [a, b]).collect();
+    let data: Vec<u32> = pairs
+        .iter()
+        .copied()
+        .chain([uniform])
+        .flat_map(|(a, b)| [a, b])
+        .collect();
     let result = run_buffers(&wgsl, &data, 4 * count, (count as u32).div_ceil(64));
     for (i, &(a, b)) in pairs.iter().enumerate() {
-        for (shape, (a, b)) in [(a, b), (a, uniform.1), (uniform.0, b), uniform].into_iter().enumerate() {
+        for (shape, (a, b)) in [(a, b), (a, uniform.1), (uniform.0, b), uniform]
+            .into_iter()
+            .enumerate()
+        {
             if applies(a, b) {
                 let (got, want) = (result[4 * i + shape], expected(a, b));
                 assert!(
                     same(got, want, result_is_float),
                     "{expression} with a = {a:#x} ({}), b = {b:#x} ({}), shape {shape}: {got:#x} ({}), not {want:#x} ({})",
-                    f32::from_bits(a), f32::from_bits(b), f32::from_bits(got), f32::from_bits(want)
+                    f32::from_bits(a),
+                    f32::from_bits(b),
+                    f32::from_bits(got),
+                    f32::from_bits(want)
                 );
             }
         }
@@ -72,11 +166,15 @@ fn float_bits() -> Vec<u32> {
 
 /// A function from floats to a float.
 fn floats_to_float(expression: &str, expected: impl Fn(f32, f32) -> f32) {
-    check(expression, "f32", true, &float_bits(), |a, b| expected(f32::from_bits(a), f32::from_bits(b)).to_bits());
+    check(expression, "f32", true, &float_bits(), |a, b| {
+        expected(f32::from_bits(a), f32::from_bits(b)).to_bits()
+    });
 }
 
 fn floats_to_int(expression: &str, expected: impl Fn(f32, f32) -> u32) {
-    check(expression, "f32", false, &float_bits(), |a, b| expected(f32::from_bits(a), f32::from_bits(b)));
+    check(expression, "f32", false, &float_bits(), |a, b| {
+        expected(f32::from_bits(a), f32::from_bits(b))
+    });
 }
 
 fn unsigned(expression: &str, expected: impl Fn(u32, u32) -> u32) {
@@ -84,7 +182,9 @@ fn unsigned(expression: &str, expected: impl Fn(u32, u32) -> u32) {
 }
 
 fn signed(expression: &str, expected: impl Fn(i32, i32) -> i32) {
-    check(expression, "i32", false, INTS, |a, b| expected(a as i32, b as i32) as u32);
+    check(expression, "i32", false, INTS, |a, b| {
+        expected(a as i32, b as i32) as u32
+    });
 }
 
 #[test]
@@ -112,7 +212,9 @@ fn float_comparisons_are_ieee() {
         (">", |a, b| a > b),
         (">=", |a, b| a >= b),
     ] {
-        floats_to_int(&format!("select(0u, 1u, a {op} b)"), |a, b| u32::from(f(a, b)));
+        floats_to_int(&format!("select(0u, 1u, a {op} b)"), |a, b| {
+            u32::from(f(a, b))
+        });
     }
 }
 
@@ -130,7 +232,15 @@ fn float_functions_are_exact() {
     floats_to_float("trunc(a)", |a, _| a.trunc());
     floats_to_float("round(a)", |a, _| a.round_ties_even());
     floats_to_float("fract(a)", |a, _| a - a.floor());
-    floats_to_float("sign(a)", |a, _| if a > 0.0 { 1.0 } else if a < 0.0 { -1.0 } else { 0.0 });
+    floats_to_float("sign(a)", |a, _| {
+        if a > 0.0 {
+            1.0
+        } else if a < 0.0 {
+            -1.0
+        } else {
+            0.0
+        }
+    });
     floats_to_float("sqrt(a)", |a, _| a.sqrt());
     floats_to_float("inverseSqrt(a)", |a, _| 1.0 / a.sqrt());
     floats_to_float("step(a, b)", |a, b| if a <= b { 1.0 } else { 0.0 });
@@ -147,7 +257,11 @@ fn float_functions_are_exact() {
     floats_to_float("modf(a).fract", |a, _| a - a.trunc());
     floats_to_float("ldexp(a, i32(clamp(b, -50.0, 50.0)))", |a, b| {
         // `max` of NaN and a number is the number.
-        let e = if b.is_nan() { -50 } else { b.clamp(-50.0, 50.0) as i32 };
+        let e = if b.is_nan() {
+            -50
+        } else {
+            b.clamp(-50.0, 50.0) as i32
+        };
         (f64::from(a) * 2.0_f64.powi(e)) as f32
     });
 }
@@ -180,7 +294,9 @@ fn conversions_saturate() {
     floats_to_int("u32(a)", |a, _| a as u32);
     floats_to_int("u32(bool(a))", |a, _| u32::from(a != 0.0));
     check("f32(a)", "u32", true, INTS, |a, _| (a as f32).to_bits());
-    check("f32(a)", "i32", true, INTS, |a, _| (a as i32 as f32).to_bits());
+    check("f32(a)", "i32", true, INTS, |a, _| {
+        (a as i32 as f32).to_bits()
+    });
     check("u32(a)", "i32", false, INTS, |a, _| a);
     unsigned("u32(bool(a))", |a, _| u32::from(a != 0));
     unsigned("u32(f32(a == b))", |a, b| u32::from(a == b));
@@ -191,7 +307,7 @@ fn integer_operators_wrap() {
     unsigned("a + b", u32::wrapping_add);
     unsigned("a - b", u32::wrapping_sub);
     unsigned("a * b", u32::wrapping_mul);
-    unsigned("a / b", |a, b| if b == 0 { a } else { a / b });
+    unsigned("a / b", |a, b| a.checked_div(b).unwrap_or(a));
     unsigned("a % b", |a, b| if b == 0 { 0 } else { a % b });
     unsigned("a & b", |a, b| a & b);
     unsigned("a | b", |a, b| a | b);
@@ -211,15 +327,23 @@ fn integer_operators_wrap() {
 #[test]
 fn integer_comparisons_know_signs() {
     for (op, u, s) in [
-        ("==", (|a, b| a == b) as fn(u32, u32) -> bool, (|a, b| a == b) as fn(i32, i32) -> bool),
+        (
+            "==",
+            (|a, b| a == b) as fn(u32, u32) -> bool,
+            (|a, b| a == b) as fn(i32, i32) -> bool,
+        ),
         ("!=", |a, b| a != b, |a, b| a != b),
         ("<", |a, b| a < b, |a, b| a < b),
         ("<=", |a, b| a <= b, |a, b| a <= b),
         (">", |a, b| a > b, |a, b| a > b),
         (">=", |a, b| a >= b, |a, b| a >= b),
     ] {
-        unsigned(&format!("select(0u, 1u, a {op} b)"), |a, b| u32::from(u(a, b)));
-        signed(&format!("select(0, 1, a {op} b)"), |a, b| i32::from(s(a, b)));
+        unsigned(&format!("select(0u, 1u, a {op} b)"), |a, b| {
+            u32::from(u(a, b))
+        });
+        signed(&format!("select(0, 1, a {op} b)"), |a, b| {
+            i32::from(s(a, b))
+        });
     }
 }
 
@@ -237,22 +361,43 @@ fn integer_functions_are_exact() {
     unsigned("countTrailingZeros(a)", |a, _| a.trailing_zeros());
     unsigned("countOneBits(a)", |a, _| a.count_ones());
     unsigned("reverseBits(a)", |a, _| a.reverse_bits());
-    unsigned("firstLeadingBit(a)", |a, _| if a == 0 { u32::MAX } else { 31 - a.leading_zeros() });
-    unsigned("firstTrailingBit(a)", |a, _| if a == 0 { u32::MAX } else { a.trailing_zeros() });
+    unsigned("firstLeadingBit(a)", |a, _| {
+        if a == 0 {
+            u32::MAX
+        } else {
+            31 - a.leading_zeros()
+        }
+    });
+    unsigned("firstTrailingBit(a)", |a, _| {
+        if a == 0 { u32::MAX } else { a.trailing_zeros() }
+    });
     signed("firstLeadingBit(a)", |a, _| {
         let bits = if a < 0 { !a } else { a };
-        if bits == 0 { -1 } else { 31 - bits.leading_zeros() as i32 }
+        if bits == 0 {
+            -1
+        } else {
+            31 - bits.leading_zeros() as i32
+        }
     });
     let field = |value: u64, offset: u32, count: u32| -> (u64, u32) {
         let offset = offset.min(32);
         let count = count.min(32 - offset);
         (value >> offset & ((1_u64 << count) - 1), count)
     };
-    unsigned("extractBits(a, b & 63u, (b >> 3u) & 63u)", |a, b| field(a.into(), b & 63, b >> 3 & 63).0 as u32);
-    signed("extractBits(a, u32(b) & 63u, (u32(b) >> 3u) & 63u)", |a, b| {
-        let (bits, count) = field((a as u32).into(), b as u32 & 63, b as u32 >> 3 & 63);
-        if count == 0 { 0 } else { ((bits << (64 - count)) as i64 >> (64 - count)) as i32 }
+    unsigned("extractBits(a, b & 63u, (b >> 3u) & 63u)", |a, b| {
+        field(a.into(), b & 63, b >> 3 & 63).0 as u32
     });
+    signed(
+        "extractBits(a, u32(b) & 63u, (u32(b) >> 3u) & 63u)",
+        |a, b| {
+            let (bits, count) = field((a as u32).into(), b as u32 & 63, b as u32 >> 3 & 63);
+            if count == 0 {
+                0
+            } else {
+                ((bits << (64 - count)) as i64 >> (64 - count)) as i32
+            }
+        },
+    );
     unsigned("insertBits(a, b, b & 63u, (a >> 3u) & 63u)", |a, b| {
         let offset = (b & 63).min(32);
         let count = (a >> 3 & 63).min(32 - offset);
@@ -263,39 +408,96 @@ fn integer_functions_are_exact() {
 
 #[test]
 fn packing_is_as_wgsl_defines() {
-    let norm = |x: f32, low: f32, scale: f32| (0.5 + scale * if x.is_nan() { low } else { x.clamp(low, 1.0) }).floor() as i32 as u32;
-    floats_to_int("pack4x8unorm(vec4<f32>(a, b, 0.3, 1.0))", |a, b| [a, b, 0.3, 1.0].iter().enumerate().fold(0, |w, (i, &x)| w | (norm(x, 0.0, 255.0) & 255) << (8 * i)));
-    floats_to_int("pack4x8snorm(vec4<f32>(a, b, -0.3, 1.0))", |a, b| [a, b, -0.3, 1.0].iter().enumerate().fold(0, |w, (i, &x)| w | (norm(x, -1.0, 127.0) & 255) << (8 * i)));
-    floats_to_int("pack2x16unorm(vec2<f32>(a, b))", |a, b| norm(a, 0.0, 65535.0) & 0xffff | norm(b, 0.0, 65535.0) << 16);
-    floats_to_int("pack2x16snorm(vec2<f32>(a, b))", |a, b| norm(a, -1.0, 32767.0) & 0xffff | norm(b, -1.0, 32767.0) << 16);
-    let values: Vec<u32> = float_bits().into_iter().filter(|&bits| !f32::from_bits(bits).is_nan()).collect();
-    check("pack2x16float(vec2<f32>(a, b))", "f32", false, &values, |a, b| {
-        let half = |bits: u32| u32::from(half::f16::from_f32(f32::from_bits(bits)).to_bits());
-        half(a) | half(b) << 16
+    let norm = |x: f32, low: f32, scale: f32| {
+        (0.5 + scale * if x.is_nan() { low } else { x.clamp(low, 1.0) }).floor() as i32 as u32
+    };
+    floats_to_int("pack4x8unorm(vec4<f32>(a, b, 0.3, 1.0))", |a, b| {
+        [a, b, 0.3, 1.0]
+            .iter()
+            .enumerate()
+            .fold(0, |w, (i, &x)| w | (norm(x, 0.0, 255.0) & 255) << (8 * i))
     });
+    floats_to_int("pack4x8snorm(vec4<f32>(a, b, -0.3, 1.0))", |a, b| {
+        [a, b, -0.3, 1.0]
+            .iter()
+            .enumerate()
+            .fold(0, |w, (i, &x)| w | (norm(x, -1.0, 127.0) & 255) << (8 * i))
+    });
+    floats_to_int("pack2x16unorm(vec2<f32>(a, b))", |a, b| {
+        norm(a, 0.0, 65535.0) & 0xffff | norm(b, 0.0, 65535.0) << 16
+    });
+    floats_to_int("pack2x16snorm(vec2<f32>(a, b))", |a, b| {
+        norm(a, -1.0, 32767.0) & 0xffff | norm(b, -1.0, 32767.0) << 16
+    });
+    let values: Vec<u32> = float_bits()
+        .into_iter()
+        .filter(|&bits| !f32::from_bits(bits).is_nan())
+        .collect();
+    check(
+        "pack2x16float(vec2<f32>(a, b))",
+        "f32",
+        false,
+        &values,
+        |a, b| {
+            let half = |bits: u32| u32::from(half::f16::from_f32(f32::from_bits(bits)).to_bits());
+            half(a) | half(b) << 16
+        },
+    );
     let byte = |a: u32, b: u32| (a >> (8 * (b & 3))) & 255;
-    check("unpack4x8unorm(a)[b & 3u]", "u32", true, INTS, |a, b| (byte(a, b) as f32 / 255.0).to_bits());
-    check("unpack4x8snorm(a)[b & 3u]", "u32", true, INTS, |a, b| (byte(a, b) as u8 as i8 as f32 / 127.0).max(-1.0).to_bits());
+    check("unpack4x8unorm(a)[b & 3u]", "u32", true, INTS, |a, b| {
+        (byte(a, b) as f32 / 255.0).to_bits()
+    });
+    check("unpack4x8snorm(a)[b & 3u]", "u32", true, INTS, |a, b| {
+        (byte(a, b) as u8 as i8 as f32 / 127.0).max(-1.0).to_bits()
+    });
     let half = |a: u32, b: u32| (a >> (16 * (b & 1))) as u16;
-    check("unpack2x16unorm(a)[b & 1u]", "u32", true, INTS, |a, b| (f32::from(half(a, b)) / 65535.0).to_bits());
-    check("unpack2x16snorm(a)[b & 1u]", "u32", true, INTS, |a, b| (f32::from(half(a, b) as i16) / 32767.0).max(-1.0).to_bits());
-    check("unpack2x16float(a)[b & 1u]", "u32", true, INTS, |a, b| half::f16::from_bits(half(a, b)).to_f32().to_bits());
+    check("unpack2x16unorm(a)[b & 1u]", "u32", true, INTS, |a, b| {
+        (f32::from(half(a, b)) / 65535.0).to_bits()
+    });
+    check("unpack2x16snorm(a)[b & 1u]", "u32", true, INTS, |a, b| {
+        (f32::from(half(a, b) as i16) / 32767.0).max(-1.0).to_bits()
+    });
+    check("unpack2x16float(a)[b & 1u]", "u32", true, INTS, |a, b| {
+        half::f16::from_bits(half(a, b)).to_f32().to_bits()
+    });
     unsigned("unpack4xU8(a)[b & 3u]", byte);
-    check("unpack4xI8(a)[b & 3u]", "u32", false, INTS, |a, b| byte(a, b) as u8 as i8 as i32 as u32);
-    unsigned("pack4xU8(vec4<u32>(a, b, 3u, 4u))", |a, b| a & 255 | (b & 255) << 8 | 3 << 16 | 4 << 24);
-    unsigned("pack4xU8Clamp(vec4<u32>(a, b, 3u, 4u))", |a, b| a.min(255) | b.min(255) << 8 | 3 << 16 | 4 << 24);
-    unsigned("dot4U8Packed(a, b)", |a, b| (0..4).map(|i| byte(a, i) * byte(b, i)).sum());
-    check("dot4I8Packed(a, b)", "u32", false, INTS, |a, b| (0..4).map(|i| i32::from(byte(a, i) as u8 as i8) * i32::from(byte(b, i) as u8 as i8)).sum::<i32>() as u32);
+    check("unpack4xI8(a)[b & 3u]", "u32", false, INTS, |a, b| {
+        byte(a, b) as u8 as i8 as i32 as u32
+    });
+    unsigned("pack4xU8(vec4<u32>(a, b, 3u, 4u))", |a, b| {
+        a & 255 | (b & 255) << 8 | 3 << 16 | 4 << 24
+    });
+    unsigned("pack4xU8Clamp(vec4<u32>(a, b, 3u, 4u))", |a, b| {
+        a.min(255) | b.min(255) << 8 | 3 << 16 | 4 << 24
+    });
+    unsigned("dot4U8Packed(a, b)", |a, b| {
+        (0..4).map(|i| byte(a, i) * byte(b, i)).sum()
+    });
+    check("dot4I8Packed(a, b)", "u32", false, INTS, |a, b| {
+        (0..4)
+            .map(|i| i32::from(byte(a, i) as u8 as i8) * i32::from(byte(b, i) as u8 as i8))
+            .sum::<i32>() as u32
+    });
 }
 
 /// Checks a function whose exact value is not representable: the result must be
 /// the reference rounded to f32, or a neighbour of that, as the f64 reference
 /// is itself not exact.
 fn close(expression: &str, reference: impl Fn(f64, f64) -> f64, domain: impl Fn(f32, f32) -> bool) {
-    let expected = |a: u32, b: u32| reference(f64::from(f32::from_bits(a)), f64::from(f32::from_bits(b))) as f32;
-    let near = |got: f32, want: f32| got == want || got.is_nan() && want.is_nan() || got == want.next_up() || got == want.next_down();
+    let expected = |a: u32, b: u32| {
+        reference(f64::from(f32::from_bits(a)), f64::from(f32::from_bits(b))) as f32
+    };
+    let near = |got: f32, want: f32| {
+        got == want
+            || got.is_nan() && want.is_nan()
+            || got == want.next_up()
+            || got == want.next_down()
+    };
     let wgsl_values = float_bits();
-    let pairs: Vec<(u32, u32)> = wgsl_values.iter().flat_map(|&a| wgsl_values.iter().map(move |&b| (a, b))).collect();
+    let pairs: Vec<(u32, u32)> = wgsl_values
+        .iter()
+        .flat_map(|&a| wgsl_values.iter().map(move |&b| (a, b)))
+        .collect();
     let wgsl = format!(
         "@group(0) @binding(0) var<storage, read> data: array<f32>;
          @group(0) @binding(1) var<storage, read_write> result: array<f32>;
@@ -311,8 +513,16 @@ fn close(expression: &str, reference: impl Fn(f64, f64) -> f64, domain: impl Fn(
     let data: Vec<u32> = pairs.iter().flat_map(|&(a, b)| [a, b]).collect();
     let result = run_buffers(&wgsl, &data, pairs.len(), (pairs.len() as u32).div_ceil(64));
     for (&(a, b), &got) in pairs.iter().zip(&result) {
-        let (a, b, got, want) = (f32::from_bits(a), f32::from_bits(b), f32::from_bits(got), expected(a, b));
-        assert!(!domain(a, b) || near(got, want), "{expression} with a = {a}, b = {b}: {got}, not {want}");
+        let (a, b, got, want) = (
+            f32::from_bits(a),
+            f32::from_bits(b),
+            f32::from_bits(got),
+            expected(a, b),
+        );
+        assert!(
+            !domain(a, b) || near(got, want),
+            "{expression} with a = {a}, b = {b}: {got}, not {want}"
+        );
     }
 }
 
@@ -337,7 +547,9 @@ fn transcendental_functions_are_accurate() {
     close("acosh(a)", |a, _| a.acosh(), any);
     close("atanh(a)", |a, _| a.atanh(), any);
     // WGSL's pow is exp2(b * log2(a)): not defined for negative a as libm's is.
-    close("pow(a, b)", f64::powf, |a, b| a > 0.0 && a.is_finite() && b.is_finite());
+    close("pow(a, b)", f64::powf, |a, b| {
+        a > 0.0 && a.is_finite() && b.is_finite()
+    });
 }
 
 #[test]
@@ -390,17 +602,33 @@ fn vectors_and_matrices_follow_their_definitions() {
         let (a, b) = ([d[0], d[1], d[2]], [d[3], d[4], d[5]]);
         let n = [[d[6], d[7]], [d[8], d[9]], [d[10], d[11]]];
         let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let c: [f32; 3] = std::array::from_fn(|i| a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+        let c: [f32; 3] = std::array::from_fn(|i| {
+            a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]
+        });
         let along = dot(b, a);
         let k = 1.0 - 0.25 * (1.0 - along * along);
         let length = dot(a, a).sqrt();
         let difference: [f32; 3] = std::array::from_fn(|i| a[i] - b[i]);
-        let p: [[f32; 3]; 3] = std::array::from_fn(|col| std::array::from_fn(|row| a[row] * n[col][0] + b[row] * n[col][1]));
+        let p: [[f32; 3]; 3] = std::array::from_fn(|col| {
+            std::array::from_fn(|row| a[row] * n[col][0] + b[row] * n[col][1])
+        });
         let mut want = vec![dot(a, b), length, dot(difference, difference).sqrt()];
         want.extend(c);
         want.extend((0..3).map(|i| a[i] - b[i] * (2.0 * along)));
-        want.extend((0..3).map(|i| if k < 0.0 { 0.0 } else { a[i] * 0.5 - b[i] * (0.5 * along + k.sqrt()) }));
-        want.extend((0..3).map(|i| if dot(b, [c[1], c[2], c[0]]) < 0.0 { a[i] } else { -a[i] }));
+        want.extend((0..3).map(|i| {
+            if k < 0.0 {
+                0.0
+            } else {
+                a[i] * 0.5 - b[i] * (0.5 * along + k.sqrt())
+            }
+        }));
+        want.extend((0..3).map(|i| {
+            if dot(b, [c[1], c[2], c[0]]) < 0.0 {
+                a[i]
+            } else {
+                -a[i]
+            }
+        }));
         want.extend((0..3).map(|i| a[i] / length));
         want.extend(p.iter().flatten());
         want.extend((0..3).map(|i| a[i] * 0.5 + b[i] * 2.0));
@@ -410,12 +638,23 @@ fn vectors_and_matrices_follow_their_definitions() {
         want.push(a[1] + b[2] * 2.0);
         let scale = [2.0, 4.0, 8.0];
         want.extend((0..3).map(|i| (a[i] + b[2 - i] * 2.0 - 1.0) / scale[i]));
-        want.push(if (0..3).any(|i| a[i] < b[i]) { 1.0 } else { 0.0 });
-        want.push(if (0..3).all(|i| a[i] < b[i]) { 1.0 } else { 0.0 });
+        want.push(if (0..3).any(|i| a[i] < b[i]) {
+            1.0
+        } else {
+            0.0
+        });
+        want.push(if (0..3).all(|i| a[i] < b[i]) {
+            1.0
+        } else {
+            0.0
+        });
         want.push(p[2][1] * 2.0 + p[2][1] - p[2][1]);
         for (i, want) in want.into_iter().enumerate() {
             let got = f32::from_bits(result[lane * 40 + i]);
-            assert!(got == want || got.is_nan() && want.is_nan(), "lane {lane}, result {i}: {got}, not {want}");
+            assert!(
+                got == want || got.is_nan() && want.is_nan(),
+                "lane {lane}, result {i}: {got}, not {want}"
+            );
         }
     }
 }

@@ -31,10 +31,18 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 #[test]
 fn blur_is_exact() {
     let (width, height) = (37, 21);
-    let source_image = image(width, height, Format::Rgba32Float, |x, y| [x as f32 * 0.1, y as f32, (x * y) as f32 / 7.0, 1.0]);
+    let source_image = image(width, height, Format::Rgba32Float, |x, y| {
+        [x as f32 * 0.1, y as f32, (x * y) as f32 / 7.0, 1.0]
+    });
     let texel = |x: i32, y: u32| -> [f32; 4] {
         let at = ((y * width) as usize + x as usize) * 16;
-        std::array::from_fn(|c| f32::from_le_bytes(source_image.bytes[at + c * 4..at + c * 4 + 4].try_into().unwrap()))
+        std::array::from_fn(|c| {
+            f32::from_le_bytes(
+                source_image.bytes[at + c * 4..at + c * 4 + 4]
+                    .try_into()
+                    .unwrap(),
+            )
+        })
     };
     let (radius, sigma) = (5_i32, 0.3_f32);
     let mut expected = Vec::new();
@@ -49,7 +57,11 @@ fn blur_is_exact() {
                 }
                 weights += weight;
             }
-            expected.extend(sum.map(|s| s / weights).iter().flat_map(|v| v.to_le_bytes()));
+            expected.extend(
+                sum.map(|s| s / weights)
+                    .iter()
+                    .flat_map(|v| v.to_le_bytes()),
+            );
         }
     }
     let program = program(BLUR);
@@ -58,8 +70,18 @@ fn blur_is_exact() {
     let params = buffer(&[radius as u32, sigma.to_bits()]);
     for (name, executor) in executors() {
         let target = empty(width, height, Format::Rgba32Float);
-        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(source.view()), BoundResource::Texture(target.view())];
-        program.dispatch(&executor, [width.div_ceil(8), height.div_ceil(8), 1], &bound).unwrap();
+        let bound = [
+            BoundResource::Buffer(&params),
+            BoundResource::Texture(source.view()),
+            BoundResource::Texture(target.view()),
+        ];
+        program
+            .dispatch(
+                &executor,
+                [width.div_ceil(8), height.div_ceil(8), 1],
+                &bound,
+            )
+            .unwrap();
         assert!(target.to_image().unwrap().bytes == expected, "{name}");
     }
 }
@@ -115,7 +137,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 ";
 
 /// The kernel above, one invocation after the other.
-fn march_reference(width: u32, height: u32, depth: impl Fn(i32, i32) -> f32, steps: u32, thickness: f32, stride: f32) -> Vec<[f32; 4]> {
+fn march_reference(
+    width: u32,
+    height: u32,
+    depth: impl Fn(i32, i32) -> f32,
+    steps: u32,
+    thickness: f32,
+    stride: f32,
+) -> Vec<[f32; 4]> {
     let sample = |x: f32, y: f32| depth(x.floor() as i32, y.floor() as i32);
     let march = |origin: [f32; 3], d: [f32; 3]| -> (bool, [f32; 2], u32) {
         let mut p = origin;
@@ -135,7 +164,11 @@ fn march_reference(width: u32, height: u32, depth: impl Fn(i32, i32) -> f32, ste
                 let mut high = p;
                 for _ in 0..4 {
                     let middle: [f32; 3] = std::array::from_fn(|c| (low[c] + high[c]) * 0.5);
-                    if middle[2] > sample(middle[0], middle[1]) { high = middle } else { low = middle }
+                    if middle[2] > sample(middle[0], middle[1]) {
+                        high = middle
+                    } else {
+                        low = middle
+                    }
                 }
                 return (true, [high[0], high[1]], i);
             }
@@ -162,23 +195,63 @@ fn march_reference(width: u32, height: u32, depth: impl Fn(i32, i32) -> f32, ste
 #[test]
 fn march_is_exact() {
     let (width, height) = (53, 40);
-    let value = |x: u32, y: u32| if (x * 7 + y * 3) % 11 == 0 { 0.0 } else { 1.0 + ((x * 13 + y * 29) % 17) as f32 * 0.05 };
-    let depth_image = image(width, height, Format::R32Float, |x, y| [value(x, y), 0.0, 0.0, 1.0]);
-    let outside = |x: i32, y: i32| if x < 0 || y < 0 || x >= width as i32 || y >= height as i32 { 0.0 } else { value(x as u32, y as u32) };
+    let value = |x: u32, y: u32| {
+        if (x * 7 + y * 3) % 11 == 0 {
+            0.0
+        } else {
+            1.0 + ((x * 13 + y * 29) % 17) as f32 * 0.05
+        }
+    };
+    let depth_image = image(width, height, Format::R32Float, |x, y| {
+        [value(x, y), 0.0, 0.0, 1.0]
+    });
+    let outside = |x: i32, y: i32| {
+        if x < 0 || y < 0 || x >= width as i32 || y >= height as i32 {
+            0.0
+        } else {
+            value(x as u32, y as u32)
+        }
+    };
     let (steps, thickness, stride) = (40, 0.3_f32, 0.7_f32);
-    let expected: Vec<u8> = march_reference(width, height, outside, steps, thickness, stride).iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
+    let expected: Vec<u8> = march_reference(width, height, outside, steps, thickness, stride)
+        .iter()
+        .flatten()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
     let program = program(MARCH);
     println!("{program}");
     let depth = texture(&depth_image);
     let params = buffer(&[steps, thickness.to_bits(), stride.to_bits()]);
     for (name, executor) in executors() {
         let target = empty(width, height, Format::Rgba32Float);
-        let bound = [BoundResource::Buffer(&params), BoundResource::Texture(depth.view()), BoundResource::Texture(target.view())];
-        program.dispatch(&executor, [width.div_ceil(8), height.div_ceil(8), 1], &bound).unwrap();
+        let bound = [
+            BoundResource::Buffer(&params),
+            BoundResource::Texture(depth.view()),
+            BoundResource::Texture(target.view()),
+        ];
+        program
+            .dispatch(
+                &executor,
+                [width.div_ceil(8), height.div_ceil(8), 1],
+                &bound,
+            )
+            .unwrap();
         let got = target.to_image().unwrap().bytes;
         for (i, (a, b)) in got.chunks(16).zip(expected.chunks(16)).enumerate() {
-            let f = |bytes: &[u8]| -> Vec<f32> { bytes.chunks(4).map(|b| f32::from_le_bytes(b.try_into().unwrap())).collect() };
-            assert!(a == b, "{name}: texel {},{}: {:?}, not {:?}", i as u32 % width, i as u32 / width, f(a), f(b));
+            let f = |bytes: &[u8]| -> Vec<f32> {
+                bytes
+                    .chunks(4)
+                    .map(|b| f32::from_le_bytes(b.try_into().unwrap()))
+                    .collect()
+            };
+            assert!(
+                a == b,
+                "{name}: texel {},{}: {:?}, not {:?}",
+                i as u32 % width,
+                i as u32 / width,
+                f(a),
+                f(b)
+            );
         }
     }
 }

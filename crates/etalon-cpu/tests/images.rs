@@ -14,7 +14,9 @@ use etalon_cpu::{BoundResource, Texture};
 /// An image of arbitrary bytes.
 fn noise(desc: TextureDesc) -> ImageData {
     let count = desc.bytes().unwrap() as usize;
-    let bytes = (0..count as u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 21) as u8).collect();
+    let bytes = (0..count as u32)
+        .map(|i| (i.wrapping_mul(2_654_435_761) >> 21) as u8)
+        .collect();
     ImageData::from_bytes(desc, bytes).unwrap()
 }
 
@@ -37,7 +39,16 @@ fn wgsl_type(format: Format) -> &'static str {
 #[test]
 fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
     for &format in Format::ALL {
-        let desc = TextureDesc { dimension: Dimension::D2, extent: Extent { width: 13, height: 7, depth_or_layers: 3 }, mips: 3, format };
+        let desc = TextureDesc {
+            dimension: Dimension::D2,
+            extent: Extent {
+                width: 13,
+                height: 7,
+                depth_or_layers: 3,
+            },
+            mips: 3,
+            format,
+        };
         let image = noise(desc);
         let texture = texture(&image);
         let wgsl = format!(
@@ -55,10 +66,23 @@ fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
         let program = program(&wgsl);
         for (name, executor) in executors() {
             let result = buffer(&vec![0xdead_beef; 16 * 12 * 25 * 4]);
-            program.dispatch(&executor, [1, 3, 25], &[BoundResource::Texture(texture.view()), BoundResource::Buffer(&result)]).unwrap();
+            program
+                .dispatch(
+                    &executor,
+                    [1, 3, 25],
+                    &[
+                        BoundResource::Texture(texture.view()),
+                        BoundResource::Buffer(&result),
+                    ],
+                )
+                .unwrap();
             let words = words(&result);
             for (i, got) in words.chunks(4).enumerate() {
-                let (x, y, z) = (i as i32 % 16 - 2, i as i32 / 16 % 12 - 2, i as i32 / (16 * 12));
+                let (x, y, z) = (
+                    i as i32 % 16 - 2,
+                    i as i32 / 16 % 12 - 2,
+                    i as i32 / (16 * 12),
+                );
                 let (layer, level) = (z % 5 - 1, z / 5);
                 let at = [x, y, layer, level].map(u32::try_from);
                 let inside = match at {
@@ -67,7 +91,10 @@ fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
                 };
                 // Where there is no texel, the channels the format has not are zero as well.
                 let want = inside.map_or([0; 4], bits);
-                assert!(got == want, "{format}, {name}, {x},{y} layer {layer} level {level}: {got:x?}, not {want:x?}");
+                assert!(
+                    got == want,
+                    "{format}, {name}, {x},{y} layer {layer} level {level}: {got:x?}, not {want:x?}"
+                );
             }
         }
     }
@@ -76,11 +103,29 @@ fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
 #[test]
 fn stores_of_every_storage_format_are_the_codec_and_skip_outside() {
     let formats = [
-        Format::R32Float, Format::Rg32Float, Format::Rgba32Float, Format::R16Float, Format::Rg16Float, Format::Rgba16Float, Format::R8Unorm, Format::Rg8Unorm,
-        Format::Rgba8Unorm, Format::Rgba8Snorm, Format::Rg11b10Ufloat, Format::Rgb10a2Unorm, Format::R32Uint, Format::R32Sint, Format::Rgba32Uint,
-        Format::Rgba16Sint, Format::Rgba8Uint, Format::R8Sint, Format::R16Uint, Format::Bgra8Unorm,
+        Format::R32Float,
+        Format::Rg32Float,
+        Format::Rgba32Float,
+        Format::R16Float,
+        Format::Rg16Float,
+        Format::Rgba16Float,
+        Format::R8Unorm,
+        Format::Rg8Unorm,
+        Format::Rgba8Unorm,
+        Format::Rgba8Snorm,
+        Format::Rg11b10Ufloat,
+        Format::Rgb10a2Unorm,
+        Format::R32Uint,
+        Format::R32Sint,
+        Format::Rgba32Uint,
+        Format::Rgba16Sint,
+        Format::Rgba8Uint,
+        Format::R8Sint,
+        Format::R16Uint,
+        Format::Bgra8Unorm,
     ];
-    let value = |x: u32, y: u32, c: u32| (x as f32 - 3.0) * 0.37 + y as f32 * 0.0113 * (c + 1) as f32;
+    let value =
+        |x: u32, y: u32, c: u32| (x as f32 - 3.0) * 0.37 + y as f32 * 0.0113 * (c + 1) as f32;
     for format in formats {
         let ty = wgsl_type(format);
         let wgsl = format!(
@@ -94,16 +139,28 @@ fn stores_of_every_storage_format_are_the_codec_and_skip_outside() {
              }}",
             scale = if ty == "f32" { "1.0" } else { "40.0" },
         );
-        let values: Vec<f32> = (0..16 * 16 * 4).map(|i| value(i / 4 % 16, i / 64, i % 4)).collect();
+        let values: Vec<f32> = (0..16 * 16 * 4)
+            .map(|i| value(i / 4 % 16, i / 64, i % 4))
+            .collect();
         let program = program(&wgsl);
         let values_buffer = floats(&values);
         for (name, executor) in executors() {
             let target = empty(11, 9, format);
-            program.dispatch(&executor, [2, 2, 1], &[BoundResource::Texture(target.view()), BoundResource::Buffer(&values_buffer)]).unwrap();
+            program
+                .dispatch(
+                    &executor,
+                    [2, 2, 1],
+                    &[
+                        BoundResource::Texture(target.view()),
+                        BoundResource::Buffer(&values_buffer),
+                    ],
+                )
+                .unwrap();
             let image = target.to_image().unwrap();
             for (x, y) in (0..9).flat_map(|y| (0..11).map(move |x| (x, y))) {
                 let (ix, iy) = (x + 1, y + 1);
-                let v: [f32; 4] = std::array::from_fn(|c| values[((iy * 16 + ix) * 4) as usize + c]);
+                let v: [f32; 4] =
+                    std::array::from_fn(|c| values[((iy * 16 + ix) * 4) as usize + c]);
                 let mut want = vec![0; format.texel_bytes() as usize];
                 if ix & 3 != 2 {
                     let texel = match ty {
@@ -113,7 +170,11 @@ fn stores_of_every_storage_format_are_the_codec_and_skip_outside() {
                     };
                     format.encode(texel, &mut want);
                 }
-                assert_eq!(image.texel_bytes(x, y, 0, 0).unwrap(), want, "{format}, {name}, {x},{y}");
+                assert_eq!(
+                    image.texel_bytes(x, y, 0, 0).unwrap(),
+                    want,
+                    "{format}, {name}, {x},{y}"
+                );
             }
         }
     }
@@ -131,20 +192,55 @@ fn read_write_textures_are_read_as_they_were_written() {
              }
          }",
     );
-    let source = image(9, 9, Format::R32Float, |x, y| [(x * 10 + y) as f32, 0.0, 0.0, 1.0]);
+    let source = image(9, 9, Format::R32Float, |x, y| {
+        [(x * 10 + y) as f32, 0.0, 0.0, 1.0]
+    });
     for (name, executor) in executors() {
         let target = texture(&source);
-        program.dispatch(&executor, [2, 2, 1], &[BoundResource::Texture(target.view())]).unwrap();
-        let expected: Vec<[f32; 4]> = source.to_rgba_f32().unwrap().iter().map(|v| [v[0] * 8.0 + 7.0, 0.0, 0.0, 1.0]).collect();
-        assert_eq!(target.to_image().unwrap().to_rgba_f32().unwrap(), expected, "{name}");
+        program
+            .dispatch(
+                &executor,
+                [2, 2, 1],
+                &[BoundResource::Texture(target.view())],
+            )
+            .unwrap();
+        let expected: Vec<[f32; 4]> = source
+            .to_rgba_f32()
+            .unwrap()
+            .iter()
+            .map(|v| [v[0] * 8.0 + 7.0, 0.0, 0.0, 1.0])
+            .collect();
+        assert_eq!(
+            target.to_image().unwrap().to_rgba_f32().unwrap(),
+            expected,
+            "{name}"
+        );
     }
 }
 
 #[test]
 fn volumes_and_views_are_addressed() {
-    let desc = TextureDesc { dimension: Dimension::D3, extent: Extent { width: 5, height: 4, depth_or_layers: 6 }, mips: 2, format: Format::R32Float };
+    let desc = TextureDesc {
+        dimension: Dimension::D3,
+        extent: Extent {
+            width: 5,
+            height: 4,
+            depth_or_layers: 6,
+        },
+        mips: 2,
+        format: Format::R32Float,
+    };
     let volume = noise(desc);
-    let layered = noise(TextureDesc { dimension: Dimension::D2, extent: Extent { width: 8, height: 8, depth_or_layers: 4 }, mips: 3, format: Format::R32Float });
+    let layered = noise(TextureDesc {
+        dimension: Dimension::D2,
+        extent: Extent {
+            width: 8,
+            height: 8,
+            depth_or_layers: 4,
+        },
+        mips: 3,
+        format: Format::R32Float,
+    });
     let program = program(
         "@group(0) @binding(0) var v: texture_3d<f32>;
          @group(0) @binding(1) var p: texture_2d<f32>;
@@ -159,18 +255,59 @@ fn volumes_and_views_are_addressed() {
          }",
     );
     let (v, p) = (texture(&volume), texture(&layered));
-    let part = p.part(Subresources { mip: 1, mips: 2, layer: 2, layers: 1 }).unwrap();
-    assert!(p.part(Subresources { mip: 1, mips: 3, layer: 2, layers: 1 }).is_none());
+    let part = p
+        .part(Subresources {
+            mip: 1,
+            mips: 2,
+            layer: 2,
+            layers: 1,
+        })
+        .unwrap();
+    assert!(
+        p.part(Subresources {
+            mip: 1,
+            mips: 3,
+            layer: 2,
+            layers: 1
+        })
+        .is_none()
+    );
     for (name, executor) in executors() {
         let result = buffer(&[0; 192]);
-        program.dispatch(&executor, [1, 1, 1], &[BoundResource::Texture(v.view()), BoundResource::Texture(part.clone()), BoundResource::Buffer(&result)]).unwrap();
+        program
+            .dispatch(
+                &executor,
+                [1, 1, 1],
+                &[
+                    BoundResource::Texture(v.view()),
+                    BoundResource::Texture(part.clone()),
+                    BoundResource::Buffer(&result),
+                ],
+            )
+            .unwrap();
         let got = words(&result);
         for i in 0..64_u32 {
-            let texel = |image: &ImageData, x, y, layer, mip| image.texel(x, y, layer, mip).map_or(0, |texel| bits(texel)[0]);
-            assert_eq!(got[i as usize], texel(&volume, i % 2, i / 2 % 2, i / 4, 1), "{name} {i}");
-            let want = if i / 4 < 4 { texel(&layered, i % 4, i / 4, 2, 1) } else { 0 };
+            let texel = |image: &ImageData, x, y, layer, mip| {
+                image
+                    .texel(x, y, layer, mip)
+                    .map_or(0, |texel| bits(texel)[0])
+            };
+            assert_eq!(
+                got[i as usize],
+                texel(&volume, i % 2, i / 2 % 2, i / 4, 1),
+                "{name} {i}"
+            );
+            let want = if i / 4 < 4 {
+                texel(&layered, i % 4, i / 4, 2, 1)
+            } else {
+                0
+            };
             assert_eq!(got[64 + i as usize], want, "{name} {i}");
-            assert_eq!(got[128 + i as usize], 2 + 20 + 300 + 2000 + if i & 1 == 1 { 20000 } else { 40000 }, "{name} {i}");
+            assert_eq!(
+                got[128 + i as usize],
+                2 + 20 + 300 + 2000 + if i & 1 == 1 { 20000 } else { 40000 },
+                "{name} {i}"
+            );
         }
     }
 }
@@ -189,7 +326,12 @@ fn filtered(image: &ImageData, mip: u32, sampler: SamplerDesc, u: f32, v: f32) -
             }
         }) as u32
     };
-    let texel = |x: i64, y: i64| image.texel(address(x, extent.width), address(y, extent.height), 0, mip).unwrap().to_f64()[0];
+    let texel = |x: i64, y: i64| {
+        image
+            .texel(address(x, extent.width), address(y, extent.height), 0, mip)
+            .unwrap()
+            .to_f64()[0]
+    };
     // As the texel is chosen in f32, so is it here.
     let (x, y) = (u * extent.width as f32, v * extent.height as f32);
     match sampler.filter {
@@ -208,7 +350,9 @@ fn filtered(image: &ImageData, mip: u32, sampler: SamplerDesc, u: f32, v: f32) -
 #[test]
 fn samples_are_filtered_addressed_and_mipped() {
     let desc = TextureDesc::d2(11, 6, Format::Rgba16Float).with_mips(3);
-    let texels: Vec<[f32; 4]> = (0..desc.bytes().unwrap() / 8).map(|i| [((i * 37) % 101) as f32 * 0.01, 0.5, -1.0, 1.0]).collect();
+    let texels: Vec<[f32; 4]> = (0..desc.bytes().unwrap() / 8)
+        .map(|i| [((i * 37) % 101) as f32 * 0.01, 0.5, -1.0, 1.0])
+        .collect();
     let image = ImageData::from_rgba_f32(desc, &texels).unwrap();
     let texture = texture(&image);
     let program = program(
@@ -226,17 +370,40 @@ fn samples_are_filtered_addressed_and_mipped() {
     );
     let count = 64 * 20_u32;
     let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
-    let data: Vec<f32> = (0..count).flat_map(|i| [random(3 * i) * 5.0 - 2.0, random(3 * i + 1) * 5.0 - 2.0, [0.0, 1.0, random(i) * 4.0 - 1.0][i as usize % 3]]).collect();
+    let data: Vec<f32> = (0..count)
+        .flat_map(|i| {
+            [
+                random(3 * i) * 5.0 - 2.0,
+                random(3 * i + 1) * 5.0 - 2.0,
+                [0.0, 1.0, random(i) * 4.0 - 1.0][i as usize % 3],
+            ]
+        })
+        .collect();
     let input = floats(&data);
-    for address in [AddressMode::ClampToEdge, AddressMode::Repeat, AddressMode::MirrorRepeat] {
+    for address in [
+        AddressMode::ClampToEdge,
+        AddressMode::Repeat,
+        AddressMode::MirrorRepeat,
+    ] {
         for filter in [Filter::Nearest, Filter::Linear] {
             for mip_filter in [Filter::Nearest, Filter::Linear] {
-                let sampler = SamplerDesc { address, filter, mip_filter };
+                let sampler = SamplerDesc {
+                    address,
+                    filter,
+                    mip_filter,
+                };
                 let mut first: Option<Vec<u32>> = None;
                 for (name, executor) in executors() {
                     let result = buffer(&vec![0; count as usize]);
-                    let bound = [BoundResource::Texture(texture.view()), BoundResource::Sampler(sampler), BoundResource::Buffer(&input), BoundResource::Buffer(&result)];
-                    program.dispatch(&executor, [count / 64, 1, 1], &bound).unwrap();
+                    let bound = [
+                        BoundResource::Texture(texture.view()),
+                        BoundResource::Sampler(sampler),
+                        BoundResource::Buffer(&input),
+                        BoundResource::Buffer(&result),
+                    ];
+                    program
+                        .dispatch(&executor, [count / 64, 1, 1], &bound)
+                        .unwrap();
                     let got = words(&result);
                     assert!(first.as_ref().is_none_or(|first| *first == got), "{name}");
                     first = Some(got);
@@ -245,17 +412,27 @@ fn samples_are_filtered_addressed_and_mipped() {
                     let lod = at[2].clamp(0.0, 2.0);
                     let level = |mip: u32| filtered(&image, mip, sampler, at[0], at[1]);
                     let want = match mip_filter {
-                        Filter::Nearest => level(((lod + 0.5).ceil() as u32).saturating_sub(1).min(2)),
+                        Filter::Nearest => {
+                            level(((lod + 0.5).ceil() as u32).saturating_sub(1).min(2))
+                        }
                         Filter::Linear => {
                             let fine = lod.floor();
                             let weight = f64::from(lod - fine);
-                            level(fine as u32) * (1.0 - weight) + if weight > 0.0 { level((fine as u32 + 1).min(2)) * weight } else { 0.0 }
+                            level(fine as u32) * (1.0 - weight)
+                                + if weight > 0.0 {
+                                    level((fine as u32 + 1).min(2)) * weight
+                                } else {
+                                    0.0
+                                }
                         }
                     };
                     // Eight products of values below 1.01, each rounded thrice,
                     // and their sum: below 40 units of 2^-24.
                     let got = f64::from(f32::from_bits(got));
-                    assert!((got - want).abs() < 40.0 * 2.0_f64.powi(-24), "{sampler:?} {i} {at:?}: {got}, not {want}");
+                    assert!(
+                        (got - want).abs() < 40.0 * 2.0_f64.powi(-24),
+                        "{sampler:?} {i} {at:?}: {got}, not {want}"
+                    );
                 }
             }
         }
@@ -268,7 +445,10 @@ fn cubes_are_seamless() {
     // direction asked for, across edges as well.
     let size = 32;
     let direction = |face: u32, x: u32, y: u32| -> [f32; 3] {
-        let (s, t) = (2.0 * (x as f32 + 0.5) / size as f32 - 1.0, 2.0 * (y as f32 + 0.5) / size as f32 - 1.0);
+        let (s, t) = (
+            2.0 * (x as f32 + 0.5) / size as f32 - 1.0,
+            2.0 * (y as f32 + 0.5) / size as f32 - 1.0,
+        );
         let d = match face {
             0 => [1.0, -t, -s],
             1 => [-1.0, -t, s],
@@ -286,7 +466,8 @@ fn cubes_are_seamless() {
             [x, y, z, 1.0]
         })
         .collect();
-    let image = ImageData::from_rgba_f32(TextureDesc::cube(size, Format::Rgba32Float), &texels).unwrap();
+    let image =
+        ImageData::from_rgba_f32(TextureDesc::cube(size, Format::Rgba32Float), &texels).unwrap();
     let cube = Texture::from_image(&image).unwrap();
     let program = program(
         "@group(0) @binding(0) var t: texture_cube<f32>;
@@ -300,11 +481,20 @@ fn cubes_are_seamless() {
     );
     let count = 64 * 64_u32;
     let random = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 8_388_608.0 - 1.0;
-    let data: Vec<f32> = (0..count).flat_map(|i| [random(3 * i + 7), random(3 * i + 8), random(3 * i + 9), 0.0]).collect();
+    let data: Vec<f32> = (0..count)
+        .flat_map(|i| [random(3 * i + 7), random(3 * i + 8), random(3 * i + 9), 0.0])
+        .collect();
     let (input, result) = (floats(&data), buffer(&vec![0; count as usize * 4]));
     let executor = executors().pop().unwrap().1;
-    let bound = [BoundResource::Texture(cube.view()), BoundResource::Sampler(SamplerDesc::LINEAR_CLAMP), BoundResource::Buffer(&input), BoundResource::Buffer(&result)];
-    program.dispatch(&executor, [count / 64, 1, 1], &bound).unwrap();
+    let bound = [
+        BoundResource::Texture(cube.view()),
+        BoundResource::Sampler(SamplerDesc::LINEAR_CLAMP),
+        BoundResource::Buffer(&input),
+        BoundResource::Buffer(&result),
+    ];
+    program
+        .dispatch(&executor, [count / 64, 1, 1], &bound)
+        .unwrap();
     for (got, want) in words(&result).chunks(4).zip(data.chunks(4)) {
         let length = (want[0] * want[0] + want[1] * want[1] + want[2] * want[2]).sqrt();
         for c in 0..3 {

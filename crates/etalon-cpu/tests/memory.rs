@@ -31,12 +31,18 @@ fn reductions_in_workgroup_memory_are_exact() {
              }}"
         );
         let groups = 5;
-        let data: Vec<u32> = (0..size * groups).map(|i| i.wrapping_mul(2_654_435_761) >> 8).collect();
+        let data: Vec<u32> = (0..size * groups)
+            .map(|i| i.wrapping_mul(2_654_435_761) >> 8)
+            .collect();
         let result = run_buffers(&wgsl, &data, (size * groups) as usize, groups);
         for (group, values) in data.chunks(size as usize).enumerate() {
             let sum: u32 = values.iter().fold(0, |sum, v| sum.wrapping_add(*v));
             for lane in 0..size {
-                assert_eq!(result[group * size as usize + lane as usize], sum.wrapping_add(lane), "size {size}, group {group}, lane {lane}");
+                assert_eq!(
+                    result[group * size as usize + lane as usize],
+                    sum.wrapping_add(lane),
+                    "size {size}, group {group}, lane {lane}"
+                );
             }
         }
     }
@@ -99,15 +105,28 @@ fn atomics_add_up() {
             workgroupBarrier();
             if lane == 0u { atomicXor(&result.bits, atomicLoad(&local) << 16u); }
         }";
-    let data: Vec<u32> = (0..64 * 6).map(|i: u32| i.wrapping_mul(40_503) % 101).collect();
+    let data: Vec<u32> = (0..64 * 6)
+        .map(|i: u32| i.wrapping_mul(40_503) % 101)
+        .collect();
     let result = run_buffers(wgsl, &data, 11, 6);
     assert_eq!(result[0], data.iter().sum::<u32>());
-    assert_eq!(result[1] as i32, data.iter().map(|&v| v as i32 - 50).min().unwrap());
-    let low = data.iter().filter(|v| **v > 90).fold(0, |bits, v| bits | 1 << (v & 7));
-    let high = data.chunks(64).fold(0, |bits, group| bits ^ group.iter().max().unwrap() << 16);
+    assert_eq!(
+        result[1] as i32,
+        data.iter().map(|&v| v as i32 - 50).min().unwrap()
+    );
+    let low = data
+        .iter()
+        .filter(|v| **v > 90)
+        .fold(0, |bits, v| bits | 1 << (v & 7));
+    let high = data
+        .chunks(64)
+        .fold(0, |bits, group| bits ^ group.iter().max().unwrap() << 16);
     assert_eq!(result[2], low | high);
     for bin in 0..8 {
-        assert_eq!(result[3 + bin as usize], data.iter().filter(|v| **v & 7 == bin).count() as u32);
+        assert_eq!(
+            result[3 + bin as usize],
+            data.iter().filter(|v| **v & 7 == bin).count() as u32
+        );
     }
 }
 
@@ -123,8 +142,12 @@ fn lists_made_with_atomics_do_not_depend_on_threads() {
         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             if data[id.x] % 3u == 0u { list.items[atomicAdd(&list.count, 1u)] = id.x; }
         }";
-    let data: Vec<u32> = (0..64 * 40).map(|i: u32| i.wrapping_mul(2_654_435_761) >> 12).collect();
-    let expected: Vec<u32> = (0..64 * 40).filter(|&i| data[i as usize] % 3 == 0).collect();
+    let data: Vec<u32> = (0..64 * 40)
+        .map(|i: u32| i.wrapping_mul(2_654_435_761) >> 12)
+        .collect();
+    let expected: Vec<u32> = (0..64 * 40)
+        .filter(|&i| data[i as usize].is_multiple_of(3))
+        .collect();
     let result = run_buffers(wgsl, &data, 64 * 40 + 1, 40);
     assert_eq!(result[0] as usize, expected.len());
     assert_eq!(result[1..=expected.len()], expected);
@@ -141,8 +164,8 @@ fn compare_exchange_takes_turns() {
             atomicStore(&result[lane], turn.old_value * 2u + u32(turn.exchanged));
         }";
     let result = run_buffers(wgsl, &[1], 65, 1);
-    for lane in 0..64 {
-        assert_eq!(result[lane], lane as u32 * 2 + 1);
+    for (lane, value) in (0..64).zip(&result) {
+        assert_eq!(*value, lane * 2 + 1);
     }
     assert_eq!(result[64], 64);
 }
@@ -180,7 +203,16 @@ fn indices_outside_are_the_last_ones() {
         let index = (lane as i32 - 20) as u32;
         let at = |length: u32| index.min(length - 1);
         let local = |i: u32| i + 1 + if i == at(4) { 100 } else { 0 };
-        let expected = [1000 + at(30), local(at(4)), 10 + at(6), at(5) + lane, 3 * at(7), 7 + at(3), local(3), 30];
+        let expected = [
+            1000 + at(30),
+            local(at(4)),
+            10 + at(6),
+            at(5) + lane,
+            3 * at(7),
+            7 + at(3),
+            local(3),
+            30,
+        ];
         assert_eq!(result[8 * lane as usize..][..8], expected, "lane {lane}");
     }
 }
@@ -242,8 +274,20 @@ fn uniform_blocks_are_read_by_layout() {
     let result = run_buffers(wgsl, &words, 64 * 8, 1);
     for lane in 0..64 {
         let light = (100 + lane % 2 * 10) as f32;
-        let expected = [630.0, 852.0, light + 1.0, light + 3.0, light + 5.0, 202.0, (lane % 3 * 3 + 1) as f32, -5.0];
-        let got: Vec<f32> = result[lane * 8..][..8].iter().map(|&bits| f32::from_bits(bits)).collect();
+        let expected = [
+            630.0,
+            852.0,
+            light + 1.0,
+            light + 3.0,
+            light + 5.0,
+            202.0,
+            (lane % 3 * 3 + 1) as f32,
+            -5.0,
+        ];
+        let got: Vec<f32> = result[lane * 8..][..8]
+            .iter()
+            .map(|&bits| f32::from_bits(bits))
+            .collect();
         assert_eq!(got, expected, "lane {lane}");
     }
 }
@@ -279,8 +323,16 @@ fn pointers_reach_the_caller() {
             sum += data[i as usize] + lane;
             trail[(i & 3) as usize] = data[i as usize] + lane;
         }
-        let (a, b) = if lane & 1 == 1 { (lane * 2, lane) } else { (lane, lane * 2) };
-        assert_eq!(result[4 * lane as usize..][..4], [sum, trail[(lane & 3) as usize], a, b], "lane {lane}");
+        let (a, b) = if lane & 1 == 1 {
+            (lane * 2, lane)
+        } else {
+            (lane, lane * 2)
+        };
+        assert_eq!(
+            result[4 * lane as usize..][..4],
+            [sum, trail[(lane & 3) as usize], a, b],
+            "lane {lane}"
+        );
     }
 }
 
@@ -300,8 +352,21 @@ fn endless_loops_end() {
     ));
     let executor = Executor::new(2).unwrap().with_max_trips(5000);
     let (data, result) = (buffer(&[0]), buffer(&[0; 64]));
-    let error = program.dispatch(&executor, [100, 1, 1], &[BoundResource::Buffer(&data), BoundResource::Buffer(&result)]).unwrap_err();
-    let RunError::EndlessLoop { location, limit: 5000, .. } = error else { panic!("{error}") };
+    let error = program
+        .dispatch(
+            &executor,
+            [100, 1, 1],
+            &[BoundResource::Buffer(&data), BoundResource::Buffer(&result)],
+        )
+        .unwrap_err();
+    let RunError::EndlessLoop {
+        location,
+        limit: 5000,
+        ..
+    } = error
+    else {
+        panic!("{error}")
+    };
     assert_eq!((location.line, location.column), (8, 14));
 }
 
@@ -319,17 +384,30 @@ fn barriers_in_divergent_control_flow_are_refused() {
     ));
     let executor = Executor::new(1).unwrap();
     let result = buffer(&[0; 64]);
-    let run = |limit: u32| program.dispatch(&executor, [1, 1, 1], &[BoundResource::Buffer(&buffer(&[limit])), BoundResource::Buffer(&result)]);
+    let run = |limit: u32| {
+        program.dispatch(
+            &executor,
+            [1, 1, 1],
+            &[
+                BoundResource::Buffer(&buffer(&[limit])),
+                BoundResource::Buffer(&result),
+            ],
+        )
+    };
     // Whether it diverges is seen as it runs.
     assert!(run(0).is_ok() && run(64).is_ok());
     let error = run(10).unwrap_err();
-    let RunError::DivergentBarrier { location, .. } = error else { panic!("{error}") };
+    let RunError::DivergentBarrier { location, .. } = error else {
+        panic!("{error}")
+    };
     assert_eq!(location.line, 8);
 }
 
 #[test]
 fn bindings_are_checked() {
-    let program = program(&format!("{HEAD} @compute @workgroup_size(1) fn main() {{ result[0] = data[0]; }}"));
+    let program = program(&format!(
+        "{HEAD} @compute @workgroup_size(1) fn main() {{ result[0] = data[0]; }}"
+    ));
     let executor = Executor::new(1).unwrap();
     let (small, texture) = (buffer(&[]), empty(1, 1, etalon_core::Format::R32Float));
     let cases = [
@@ -339,10 +417,16 @@ fn bindings_are_checked() {
     ];
     for (bound, found) in cases {
         let error = program.dispatch(&executor, [1, 1, 1], &bound).unwrap_err();
-        assert!(matches!(error, RunError::Binding { .. }) && error.to_string().contains(found), "{error}");
+        assert!(
+            matches!(error, RunError::Binding { .. }) && error.to_string().contains(found),
+            "{error}"
+        );
     }
     let good = buffer(&[0]);
     let bound = [BoundResource::Buffer(&good), BoundResource::Buffer(&good)];
     assert!(program.dispatch(&executor, [0, 1, 1], &bound).is_ok());
-    assert!(matches!(program.dispatch(&executor, [u32::MAX; 3], &bound), Err(RunError::TooManyWorkgroups { .. })));
+    assert!(matches!(
+        program.dispatch(&executor, [u32::MAX; 3], &bound),
+        Err(RunError::TooManyWorkgroups { .. })
+    ));
 }

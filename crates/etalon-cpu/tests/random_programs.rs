@@ -55,12 +55,19 @@ struct Random(u64);
 
 impl Random {
     fn below(&mut self, limit: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) as u32 % limit
     }
 
     fn expr(&mut self, depth: u32, loops: usize) -> Expr {
-        let pick = if depth == 0 { self.below(5) } else { self.below(12) };
+        let pick = if depth == 0 {
+            self.below(5)
+        } else {
+            self.below(12)
+        };
         let sub = |random: &mut Self| Box::new(random.expr(depth - 1, loops));
         match pick {
             0 => Expr::Constant(self.below(9)),
@@ -81,13 +88,21 @@ impl Random {
         match self.below(if depth == 0 { 2 } else { 4 }) {
             0 => Condition::Less(self.expr(1, loops), self.expr(1, loops)),
             1 => Condition::Bit(self.expr(1, loops), self.below(4)),
-            2 => Condition::And(Box::new(self.condition(depth - 1, loops)), Box::new(self.condition(depth - 1, loops))),
-            _ => Condition::Or(Box::new(self.condition(depth - 1, loops)), Box::new(self.condition(depth - 1, loops))),
+            2 => Condition::And(
+                Box::new(self.condition(depth - 1, loops)),
+                Box::new(self.condition(depth - 1, loops)),
+            ),
+            _ => Condition::Or(
+                Box::new(self.condition(depth - 1, loops)),
+                Box::new(self.condition(depth - 1, loops)),
+            ),
         }
     }
 
     fn block(&mut self, depth: u32, loops: usize) -> Vec<Stmt> {
-        (0..1 + self.below(4)).map(|_| self.stmt(depth, loops)).collect()
+        (0..1 + self.below(4))
+            .map(|_| self.stmt(depth, loops))
+            .collect()
     }
 
     fn stmt(&mut self, depth: u32, loops: usize) -> Stmt {
@@ -102,13 +117,25 @@ impl Random {
             4 => Stmt::Assign(variable, self.expr(1, loops)),
             5..=8 => {
                 let accept = self.block(depth - 1, loops);
-                let reject = if self.below(2) == 0 { Vec::new() } else { self.block(depth - 1, loops) };
+                let reject = if self.below(2) == 0 {
+                    Vec::new()
+                } else {
+                    self.block(depth - 1, loops)
+                };
                 Stmt::If(self.condition(1, loops), accept, reject)
             }
             9..=11 => Stmt::For(1 + self.below(5), self.block(depth - 1, loops + 1)),
-            12 => Stmt::Loop(1 + self.below(4), self.block(depth - 1, loops + 1), variable, self.expr(1, loops + 1), self.condition(0, loops + 1)),
+            12 => Stmt::Loop(
+                1 + self.below(4),
+                self.block(depth - 1, loops + 1),
+                variable,
+                self.expr(1, loops + 1),
+                self.condition(0, loops + 1),
+            ),
             13 | 14 => {
-                let cases = (0..1 + self.below(3)).map(|i| (vec![3 * i, 3 * i + 1], self.block(depth - 1, loops))).collect();
+                let cases = (0..1 + self.below(3))
+                    .map(|i| (vec![3 * i, 3 * i + 1], self.block(depth - 1, loops)))
+                    .collect();
                 Stmt::Switch(self.expr(1, loops), cases, self.block(depth - 1, loops))
             }
             _ => Stmt::ReturnIf(self.condition(1, loops)),
@@ -145,7 +172,13 @@ fn block_text(block: &[Stmt], loops: usize, out: &mut String) {
     for stmt in block {
         match stmt {
             Stmt::Assign(i, value) => writeln!(out, "v{i} = {};", expr_text(value)).unwrap(),
-            Stmt::SetElement(i, value) => writeln!(out, "elements[{} & 3u] = {};", expr_text(i), expr_text(value)).unwrap(),
+            Stmt::SetElement(i, value) => writeln!(
+                out,
+                "elements[{} & 3u] = {};",
+                expr_text(i),
+                expr_text(value)
+            )
+            .unwrap(),
             Stmt::If(condition, accept, reject) => {
                 writeln!(out, "if {} {{", condition_text(condition)).unwrap();
                 block_text(accept, loops, out);
@@ -154,7 +187,11 @@ fn block_text(block: &[Stmt], loops: usize, out: &mut String) {
                 out.push_str("}\n");
             }
             Stmt::For(trips, body) => {
-                writeln!(out, "for (var i{loops} = 0u; i{loops} < {trips}u; i{loops}++) {{").unwrap();
+                writeln!(
+                    out,
+                    "for (var i{loops} = 0u; i{loops} < {trips}u; i{loops}++) {{"
+                )
+                .unwrap();
                 block_text(body, loops + 1, out);
                 out.push_str("}\n");
             }
@@ -175,9 +212,18 @@ fn block_text(block: &[Stmt], loops: usize, out: &mut String) {
                 block_text(default, loops, out);
                 out.push_str("}\n}\n");
             }
-            Stmt::BreakIf(condition) => writeln!(out, "if {} {{ break; }}", condition_text(condition)).unwrap(),
-            Stmt::ContinueIf(condition) => writeln!(out, "if {} {{ continue; }}", condition_text(condition)).unwrap(),
-            Stmt::ReturnIf(condition) => writeln!(out, "if {} {{ return Result(v0, v1, v2, v3, v4); }}", condition_text(condition)).unwrap(),
+            Stmt::BreakIf(condition) => {
+                writeln!(out, "if {} {{ break; }}", condition_text(condition)).unwrap()
+            }
+            Stmt::ContinueIf(condition) => {
+                writeln!(out, "if {} {{ continue; }}", condition_text(condition)).unwrap()
+            }
+            Stmt::ReturnIf(condition) => writeln!(
+                out,
+                "if {} {{ return Result(v0, v1, v2, v3, v4); }}",
+                condition_text(condition)
+            )
+            .unwrap(),
         }
     }
 }
@@ -250,8 +296,16 @@ impl Invocation {
     fn stmt(&mut self, stmt: &Stmt) -> Flow {
         match stmt {
             Stmt::Assign(i, value) => self.variables[*i] = self.expr(value),
-            Stmt::SetElement(i, value) => self.elements[(self.expr(i) & 3) as usize] = self.expr(value),
-            Stmt::If(condition, accept, reject) => return if self.holds(condition) { self.block(accept) } else { self.block(reject) },
+            Stmt::SetElement(i, value) => {
+                self.elements[(self.expr(i) & 3) as usize] = self.expr(value)
+            }
+            Stmt::If(condition, accept, reject) => {
+                return if self.holds(condition) {
+                    self.block(accept)
+                } else {
+                    self.block(reject)
+                };
+            }
             Stmt::For(trips, body) => {
                 self.counters.push(0);
                 let level = self.counters.len() - 1;
@@ -284,7 +338,10 @@ impl Invocation {
             }
             Stmt::Switch(selector, cases, default) => {
                 let selector = self.expr(selector);
-                let body = cases.iter().find(|(values, _)| values.contains(&selector)).map_or(default, |(_, body)| body);
+                let body = cases
+                    .iter()
+                    .find(|(values, _)| values.contains(&selector))
+                    .map_or(default, |(_, body)| body);
                 return match self.block(body) {
                     // `break` in a case leaves the switch.
                     Flow::Break => Flow::Next,
@@ -304,8 +361,13 @@ impl Invocation {
 /// that still does.
 fn run(seed: u64, size: u32) {
     let mut body = Random(seed).block(4, 0);
-    let Some(mut message) = mistake(&body, size) else { return };
-    while let Some((less, why)) = smaller(&body).into_iter().find_map(|less| mistake(&less, size).map(|why| (less, why))) {
+    let Some(mut message) = mistake(&body, size) else {
+        return;
+    };
+    while let Some((less, why)) = smaller(&body)
+        .into_iter()
+        .find_map(|less| mistake(&less, size).map(|why| (less, why)))
+    {
         (body, message) = (less, why);
     }
     panic!("seed {seed}, workgroup size {size}: {message}");
@@ -338,11 +400,19 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
          }}"
     );
     let groups = 3;
-    let data: Vec<u32> = (0..size).map(|i| i.wrapping_mul(2_654_435_761) >> 27).collect();
+    let data: Vec<u32> = (0..size)
+        .map(|i| i.wrapping_mul(2_654_435_761) >> 27)
+        .collect();
     let result = run_buffers(&wgsl, &data, (groups * size) as usize * VARIABLES, groups);
     for group in 0..groups {
         for lane in 0..size {
-            let mut invocation = Invocation { variables: [lane, group, data[lane as usize], 7, lane * lane], elements: [1, lane, group, 4], counters: Vec::new(), lane, group };
+            let mut invocation = Invocation {
+                variables: [lane, group, data[lane as usize], 7, lane * lane],
+                elements: [1, lane, group, 4],
+                counters: Vec::new(),
+                lane,
+                group,
+            };
             let returned = invocation.block(body) == Flow::Return;
             let mut expected = invocation.variables;
             if !returned {
@@ -353,7 +423,10 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
             let at = (group * size + lane) as usize * VARIABLES;
             let got = &result[at..at + VARIABLES];
             if got != expected {
-                return Some(format!("group {group}, lane {lane}: {got:?}, not {expected:?}\n{wgsl}\n{}", program(&wgsl)));
+                return Some(format!(
+                    "group {group}, lane {lane}: {got:?}, not {expected:?}\n{wgsl}\n{}",
+                    program(&wgsl)
+                ));
             }
         }
     }
@@ -377,30 +450,63 @@ fn random_programs_of_any_workgroup_size() {
 /// All programs with one statement less, or with a compound one replaced by its parts.
 fn smaller(block: &[Stmt]) -> Vec<Vec<Stmt>> {
     let mut all = Vec::new();
-    let replace = |i: usize, with: Vec<Stmt>| -> Vec<Stmt> { block[..i].iter().cloned().chain(with).chain(block[i + 1..].iter().cloned()).collect() };
+    let replace = |i: usize, with: Vec<Stmt>| -> Vec<Stmt> {
+        block[..i]
+            .iter()
+            .cloned()
+            .chain(with)
+            .chain(block[i + 1..].iter().cloned())
+            .collect()
+    };
     for (i, stmt) in block.iter().enumerate() {
         all.push(replace(i, Vec::new()));
         match stmt {
             Stmt::If(c, a, b) => {
                 all.push(replace(i, a.clone()));
                 all.push(replace(i, b.clone()));
-                all.extend(smaller(a).into_iter().map(|a| replace(i, vec![Stmt::If(c.clone(), a, b.clone())])));
-                all.extend(smaller(b).into_iter().map(|b| replace(i, vec![Stmt::If(c.clone(), a.clone(), b)])));
+                all.extend(
+                    smaller(a)
+                        .into_iter()
+                        .map(|a| replace(i, vec![Stmt::If(c.clone(), a, b.clone())])),
+                );
+                all.extend(
+                    smaller(b)
+                        .into_iter()
+                        .map(|b| replace(i, vec![Stmt::If(c.clone(), a.clone(), b)])),
+                );
             }
-            Stmt::For(n, a) => all.extend(smaller(a).into_iter().map(|a| replace(i, vec![Stmt::For(*n, a)]))),
-            Stmt::Loop(n, a, v, e, c) => all.extend(smaller(a).into_iter().map(|a| replace(i, vec![Stmt::Loop(*n, a, *v, e.clone(), c.clone())]))),
+            Stmt::For(n, a) => all.extend(
+                smaller(a)
+                    .into_iter()
+                    .map(|a| replace(i, vec![Stmt::For(*n, a)])),
+            ),
+            Stmt::Loop(n, a, v, e, c) => all.extend(
+                smaller(a)
+                    .into_iter()
+                    .map(|a| replace(i, vec![Stmt::Loop(*n, a, *v, e.clone(), c.clone())])),
+            ),
             Stmt::Switch(e, cases, default) => {
                 for k in 0..cases.len() {
                     let mut less = cases.clone();
                     less.remove(k);
-                    all.push(replace(i, vec![Stmt::Switch(e.clone(), less, default.clone())]));
+                    all.push(replace(
+                        i,
+                        vec![Stmt::Switch(e.clone(), less, default.clone())],
+                    ));
                     for body in smaller(&cases[k].1) {
                         let mut less = cases.clone();
                         less[k].1 = body;
-                        all.push(replace(i, vec![Stmt::Switch(e.clone(), less, default.clone())]));
+                        all.push(replace(
+                            i,
+                            vec![Stmt::Switch(e.clone(), less, default.clone())],
+                        ));
                     }
                 }
-                all.extend(smaller(default).into_iter().map(|d| replace(i, vec![Stmt::Switch(e.clone(), cases.clone(), d)])));
+                all.extend(
+                    smaller(default)
+                        .into_iter()
+                        .map(|d| replace(i, vec![Stmt::Switch(e.clone(), cases.clone(), d)])),
+                );
             }
             _ => {}
         }

@@ -36,7 +36,11 @@ impl Histories {
     /// first contents if it is new.
     pub(super) fn acquire(&mut self, plan: &Plan, pool: &mut Pool) -> Result<(), RunError> {
         for planned in &plan.histories {
-            if self.0.get(&planned.name).is_some_and(|history| history.previous.desc() == planned.desc) {
+            if self
+                .0
+                .get(&planned.name)
+                .is_some_and(|history| history.previous.desc() == planned.desc)
+            {
                 continue;
             }
             if let Some(other) = self.0.remove(&planned.name) {
@@ -45,7 +49,8 @@ impl Histories {
             let previous = pool.texture(planned.desc)?;
             previous.view().fill(clear_texel(planned.initial));
             let current = pool.texture(planned.desc)?;
-            self.0.insert(planned.name.clone(), History { previous, current });
+            self.0
+                .insert(planned.name.clone(), History { previous, current });
         }
         Ok(())
     }

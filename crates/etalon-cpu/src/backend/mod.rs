@@ -35,7 +35,12 @@ pub struct CpuOptions {
 
 impl Default for CpuOptions {
     fn default() -> Self {
-        Self { threads: 0, tier: None, lanes: 64, max_trips: Executor::DEFAULT_MAX_TRIPS }
+        Self {
+            threads: 0,
+            tier: None,
+            lanes: 64,
+            max_trips: Executor::DEFAULT_MAX_TRIPS,
+        }
     }
 }
 
@@ -55,9 +60,21 @@ impl CpuBackend {
     /// # Errors
     /// [`BackendError::NoDevice`] if the system gives no threads.
     pub fn new(options: &CpuOptions) -> Result<Self, BackendError> {
-        let executor = Executor::new(options.threads).map_err(|error| BackendError::NoDevice { backend: "cpu", reason: error.to_string() })?;
-        let executor = executor.with_lanes(options.lanes).with_max_trips(options.max_trips).with_tier(options.tier.unwrap_or_else(Tier::best));
-        Ok(Self { executor, programs: HashMap::new(), pool: Pool::default(), histories: Histories::default(), counters: Counters::default() })
+        let executor = Executor::new(options.threads).map_err(|error| BackendError::NoDevice {
+            backend: "cpu",
+            reason: error.to_string(),
+        })?;
+        let executor = executor
+            .with_lanes(options.lanes)
+            .with_max_trips(options.max_trips)
+            .with_tier(options.tier.unwrap_or_else(Tier::best));
+        Ok(Self {
+            executor,
+            programs: HashMap::new(),
+            pool: Pool::default(),
+            histories: Histories::default(),
+            counters: Counters::default(),
+        })
     }
 
     /// What runs the programs.
@@ -72,13 +89,21 @@ impl CpuBackend {
     /// [`BackendError::Kernel`] if the kernel uses what the interpreter does not have.
     pub fn program(&mut self, kernel: &Arc<Kernel>) -> Result<&Program, BackendError> {
         self.prepare(&kernel.name, kernel)?;
-        self.programs.get(&kernel.id).ok_or_else(|| BackendError::Api { call: "translate", reason: format!("kernel {} was not kept", kernel.name) })
+        self.programs
+            .get(&kernel.id)
+            .ok_or_else(|| BackendError::Api {
+                call: "translate",
+                reason: format!("kernel {} was not kept", kernel.name),
+            })
     }
 
     /// Translates a kernel unless that was done before.
     fn prepare(&mut self, step: &str, kernel: &Arc<Kernel>) -> Result<(), BackendError> {
         if let std::collections::hash_map::Entry::Vacant(entry) = self.programs.entry(kernel.id) {
-            let program = Program::translate(kernel).map_err(|error| BackendError::Kernel { step: step.to_owned(), error: Box::new(error) })?;
+            let program = Program::translate(kernel).map_err(|error| BackendError::Kernel {
+                step: step.to_owned(),
+                error: Box::new(error),
+            })?;
             entry.insert(program);
             self.counters.kernels += 1;
             self.counters.pipelines += 1;
@@ -91,13 +116,19 @@ impl CpuBackend {
 fn step_error(step: &str, error: RunError) -> BackendError {
     match error {
         RunError::OutOfMemory { what, bytes } => BackendError::OutOfMemory { what, bytes },
-        other => BackendError::Kernel { step: step.to_owned(), error: Box::new(other) },
+        other => BackendError::Kernel {
+            step: step.to_owned(),
+            error: Box::new(other),
+        },
     }
 }
 
 /// A plan that contradicts itself.
 fn malformed(step: &str, what: impl std::fmt::Display) -> BackendError {
-    BackendError::Api { call: "plan", reason: format!("step `{step}`: {what}") }
+    BackendError::Api {
+        call: "plan",
+        reason: format!("step `{step}`: {what}"),
+    }
 }
 
 impl Backend for CpuBackend {
@@ -105,7 +136,11 @@ impl Backend for CpuBackend {
         BackendInfo {
             backend: "cpu",
             api: self.executor.tier().to_string(),
-            device: format!("{} threads of {}", self.executor.threads(), std::env::consts::ARCH),
+            device: format!(
+                "{} threads of {}",
+                self.executor.threads(),
+                std::env::consts::ARCH
+            ),
             driver: format!("{} {}", env!("CARGO_PKG_NAME"), env!("CARGO_PKG_VERSION")),
         }
     }
@@ -113,7 +148,14 @@ impl Backend for CpuBackend {
     fn limits(&self) -> Limits {
         // Beyond what WebGPU guarantees, only memory limits the interpreter;
         // these are what large devices have.
-        Limits { max_texture_2d: 16_384, max_texture_layers: 2048, max_workgroup_invocations: 1024, max_workgroup_bytes: 1 << 16, uniform_alignment: 16, ..Limits::default() }
+        Limits {
+            max_texture_2d: 16_384,
+            max_texture_layers: 2048,
+            max_workgroup_invocations: 1024,
+            max_workgroup_bytes: 1 << 16,
+            uniform_alignment: 16,
+            ..Limits::default()
+        }
     }
 
     fn execute(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
@@ -126,6 +168,12 @@ impl Backend for CpuBackend {
 
     fn counters(&self) -> Counters {
         let made = self.pool.counters();
-        Counters { textures: made.textures, buffers: made.buffers, allocations: made.textures + made.buffers, bytes: made.bytes, ..self.counters }
+        Counters {
+            textures: made.textures,
+            buffers: made.buffers,
+            allocations: made.textures + made.buffers,
+            bytes: made.bytes,
+            ..self.counters
+        }
     }
 }

@@ -32,7 +32,16 @@ pub(super) struct Pool {
 struct Shape(etalon_core::Format, u8, [u32; 4]);
 
 fn shape(desc: &TextureDesc) -> Shape {
-    Shape(desc.format, desc.dimension as u8, [desc.extent.width, desc.extent.height, desc.extent.depth_or_layers, desc.mips])
+    Shape(
+        desc.format,
+        desc.dimension as u8,
+        [
+            desc.extent.width,
+            desc.extent.height,
+            desc.extent.depth_or_layers,
+            desc.mips,
+        ],
+    )
 }
 
 impl Pool {
@@ -63,11 +72,17 @@ impl Pool {
     }
 
     pub(super) fn return_texture(&mut self, texture: Texture) {
-        self.textures.entry(shape(&texture.desc())).or_default().push((self.frame, texture));
+        self.textures
+            .entry(shape(&texture.desc()))
+            .or_default()
+            .push((self.frame, texture));
     }
 
     pub(super) fn return_buffer(&mut self, buffer: Buffer) {
-        self.buffers.entry(buffer.len()).or_default().push((self.frame, buffer));
+        self.buffers
+            .entry(buffer.len())
+            .or_default()
+            .push((self.frame, buffer));
     }
 
     /// Frees what no frame has used for a while.

@@ -15,7 +15,11 @@ use crate::memory::Buffer;
 use crate::program::BoundResource;
 
 impl CpuBackend {
-    pub(super) fn run(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
+    pub(super) fn run(
+        &mut self,
+        plan: &Plan,
+        inputs: &Inputs<'_>,
+    ) -> Result<Execution, BackendError> {
         for step in &plan.steps {
             if let Step::Dispatch { kernel, .. } = &step.step {
                 self.prepare(&step.name, &kernel.0)?;
@@ -31,9 +35,16 @@ impl CpuBackend {
         result
     }
 
-    fn run_with(&mut self, plan: &Plan, inputs: &Inputs<'_>, resources: &mut Resources) -> Result<Execution, BackendError> {
+    fn run_with(
+        &mut self,
+        plan: &Plan,
+        inputs: &Inputs<'_>,
+        resources: &mut Resources,
+    ) -> Result<Execution, BackendError> {
         resources.acquire(plan, inputs, &mut self.pool)?;
-        self.histories.acquire(plan, &mut self.pool).map_err(|error| step_error("histories", error))?;
+        self.histories
+            .acquire(plan, &mut self.pool)
+            .map_err(|error| step_error("histories", error))?;
         let mut execution = Execution::default();
         for step in &plan.steps {
             let start = Instant::now();
@@ -43,7 +54,10 @@ impl CpuBackend {
                 Some(captured) => execution.captures.push(captured),
                 None => {
                     let nanoseconds = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
-                    execution.times.push(StepTime { step: step.name.clone(), nanoseconds });
+                    execution.times.push(StepTime {
+                        step: step.name.clone(),
+                        nanoseconds,
+                    });
                 }
             }
         }
@@ -51,10 +65,26 @@ impl CpuBackend {
         Ok(execution)
     }
 
-    fn step(&mut self, plan: &Plan, name: &str, step: &Step, resources: &Resources) -> Result<Option<Captured>, BackendError> {
+    fn step(
+        &mut self,
+        plan: &Plan,
+        name: &str,
+        step: &Step,
+        resources: &Resources,
+    ) -> Result<Option<Captured>, BackendError> {
         match step {
-            Step::Dispatch { kernel, bindings, groups } => self.dispatch(plan, name, &kernel.0, bindings, groups, resources)?,
-            Step::ClearTexture { resource, range, value } => resources.texture(name, plan, &self.histories, *resource, *range)?.fill(clear_texel(*value)),
+            Step::Dispatch {
+                kernel,
+                bindings,
+                groups,
+            } => self.dispatch(plan, name, &kernel.0, bindings, groups, resources)?,
+            Step::ClearTexture {
+                resource,
+                range,
+                value,
+            } => resources
+                .texture(name, plan, &self.histories, *resource, *range)?
+                .fill(clear_texel(*value)),
             Step::ClearBuffer { resource } => resources.buffer(name, *resource)?.clear(),
             Step::CopyTexture { source, target } => {
                 let from = resources.texture(name, plan, &self.histories, source.0, source.1)?;
@@ -63,31 +93,70 @@ impl CpuBackend {
                     return Err(malformed(name, "source and target are of different shapes"));
                 }
             }
-            Step::CopyBuffer { source, target } => resources.buffer(name, *target)?.copy_from(resources.buffer(name, *source)?),
-            Step::Capture { resource, range, pass, binding } => {
+            Step::CopyBuffer { source, target } => resources
+                .buffer(name, *target)?
+                .copy_from(resources.buffer(name, *source)?),
+            Step::Capture {
+                resource,
+                range,
+                pass,
+                binding,
+            } => {
                 let Some(planned) = plan.resources.get(*resource as usize) else {
-                    return Err(malformed(name, format_args!("there is no resource {resource}")));
+                    return Err(malformed(
+                        name,
+                        format_args!("there is no resource {resource}"),
+                    ));
                 };
                 let data = match planned.desc {
                     ResourceDesc::Texture(_) => {
-                        let view = resources.texture(name, plan, &self.histories, *resource, *range)?;
-                        CapturedData::Texture(view.to_image().map_err(|error| step_error(name, error))?)
+                        let view =
+                            resources.texture(name, plan, &self.histories, *resource, *range)?;
+                        CapturedData::Texture(
+                            view.to_image().map_err(|error| step_error(name, error))?,
+                        )
                     }
-                    ResourceDesc::Buffer(_) => CapturedData::Buffer(resources.buffer(name, *resource)?.to_bytes().map_err(|error| step_error(name, error))?),
+                    ResourceDesc::Buffer(_) => CapturedData::Buffer(
+                        resources
+                            .buffer(name, *resource)?
+                            .to_bytes()
+                            .map_err(|error| step_error(name, error))?,
+                    ),
                 };
-                return Ok(Some(Captured { pass: pass.clone(), binding: binding.clone(), resource: planned.name.clone(), data }));
+                return Ok(Some(Captured {
+                    pass: pass.clone(),
+                    binding: binding.clone(),
+                    resource: planned.name.clone(),
+                    data,
+                }));
             }
         }
         Ok(None)
     }
 
-    fn dispatch(&mut self, plan: &Plan, name: &str, kernel: &Kernel, bindings: &[Bound], groups: &Groups, resources: &Resources) -> Result<(), BackendError> {
-        let program = self.programs.get(&kernel.id).ok_or_else(|| malformed(name, "its kernel was not translated"))?;
+    fn dispatch(
+        &mut self,
+        plan: &Plan,
+        name: &str,
+        kernel: &Kernel,
+        bindings: &[Bound],
+        groups: &Groups,
+        resources: &Resources,
+    ) -> Result<(), BackendError> {
+        let program = self
+            .programs
+            .get(&kernel.id)
+            .ok_or_else(|| malformed(name, "its kernel was not translated"))?;
         let groups = match groups {
             Groups::Direct(groups) => *groups,
             Groups::Indirect { buffer, offset } => {
                 let buffer = resources.buffer(name, *buffer)?;
-                let word = |axis: u64| offset.checked_add(4 * axis).filter(|at| at % 4 == 0).and_then(|at| buffer.word(at));
+                let word = |axis: u64| {
+                    offset
+                        .checked_add(4 * axis)
+                        .filter(|at| at % 4 == 0)
+                        .and_then(|at| buffer.word(at))
+                };
                 match (word(0), word(1), word(2)) {
                     (Some(x), Some(y), Some(z)) => [x, y, z],
                     _ => return Err(malformed(name, "its arguments are outside of their buffer")),
@@ -98,8 +167,12 @@ impl CpuBackend {
         let mut uniforms = Vec::new();
         for bound in bindings {
             if let Bound::Uniform(slice) = bound {
-                let range = slice.offset as usize..(slice.offset as usize).saturating_add(slice.size as usize);
-                let bytes = plan.uniforms.get(range).ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?;
+                let range = slice.offset as usize
+                    ..(slice.offset as usize).saturating_add(slice.size as usize);
+                let bytes = plan
+                    .uniforms
+                    .get(range)
+                    .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?;
                 uniforms.push(Buffer::from_bytes(bytes).map_err(|error| step_error(name, error))?);
             }
         }
@@ -107,24 +180,47 @@ impl CpuBackend {
         let mut given = Vec::with_capacity(bindings.len());
         for bound in bindings {
             given.push(match *bound {
-                Bound::Texture { resource, range } => BoundResource::Texture(resources.texture(name, plan, &self.histories, resource, range)?),
-                Bound::Buffer { resource } => BoundResource::Buffer(resources.buffer(name, resource)?),
-                Bound::Uniform(_) => BoundResource::Buffer(next_uniform.next().ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?),
+                Bound::Texture { resource, range } => BoundResource::Texture(resources.texture(
+                    name,
+                    plan,
+                    &self.histories,
+                    resource,
+                    range,
+                )?),
+                Bound::Buffer { resource } => {
+                    BoundResource::Buffer(resources.buffer(name, resource)?)
+                }
+                Bound::Uniform(_) => BoundResource::Buffer(
+                    next_uniform
+                        .next()
+                        .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?,
+                ),
                 Bound::Sampler(sampler) => BoundResource::Sampler(sampler),
             });
         }
         // The kernel lists bindings by number, the program by declaration.
         let mut bound = Vec::with_capacity(given.len());
         for wanted in program.bindings() {
-            let position = kernel.bindings.iter().position(|binding| (binding.group, binding.binding) == (wanted.group, wanted.binding));
-            let found = position.and_then(|position| given.get(position)).ok_or_else(|| {
-                let error = RunError::Binding { kernel: kernel.name.clone(), binding: wanted.name.clone(), expected: "a resource".to_owned(), found: "nothing".to_owned() };
-                step_error(name, error)
-            })?;
+            let position = kernel.bindings.iter().position(|binding| {
+                (binding.group, binding.binding) == (wanted.group, wanted.binding)
+            });
+            let found = position
+                .and_then(|position| given.get(position))
+                .ok_or_else(|| {
+                    let error = RunError::Binding {
+                        kernel: kernel.name.clone(),
+                        binding: wanted.name.clone(),
+                        expected: "a resource".to_owned(),
+                        found: "nothing".to_owned(),
+                    };
+                    step_error(name, error)
+                })?;
             bound.push(found.clone());
         }
         self.counters.dispatches += 1;
-        program.dispatch(&self.executor, groups, &bound).map_err(|error| step_error(name, error))?;
+        program
+            .dispatch(&self.executor, groups, &bound)
+            .map_err(|error| step_error(name, error))?;
         Ok(())
     }
 }

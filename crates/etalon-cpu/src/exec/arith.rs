@@ -51,7 +51,11 @@ impl<N: Number> Visitor<N> for Select<'_> {
 /// Whether an instruction writes a register that it also reads. Its loop over
 /// lanes then works on a copy, so that loops need never fear overlap.
 #[inline(always)]
-fn overlaps<N: Number, A: ClassOf<N>, D: ClassOf<N>>(varying: bool, operand: u16, result: u16) -> bool {
+fn overlaps<N: Number, A: ClassOf<N>, D: ClassOf<N>>(
+    varying: bool,
+    operand: u16,
+    result: u16,
+) -> bool {
     varying && A::CLASS == D::CLASS && operand == result
 }
 
@@ -65,7 +69,11 @@ impl<N: Number, O: Unary<N>> Step<N> for UnaryLanes<O> {
             let (d, a) = (state.at(instr.d, chunk), state.at(instr.a, chunk));
             if overlap {
                 let a = *O::A::lanes(&state.registers, a);
-                map1(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, O::eval);
+                map1(
+                    &mut O::D::lanes_mut(&mut state.registers, d).0,
+                    &a.0,
+                    O::eval,
+                );
             } else {
                 let (d, rest) = O::D::split(&mut state.registers, d);
                 map1(&mut d.0, &O::A::other(&rest, a).0, O::eval);
@@ -86,8 +94,15 @@ impl<N: Number, O: Unary<N>> Step<N> for UnaryUniform<O> {
 
 /// An operand that is varying or not: its lanes, or its one number.
 #[inline(always)]
-fn uniform_unless<N: Number, C: ClassOf<N>, const VARYING: bool>(registers: &Registers<N>, number: u16) -> Lane<N, C> {
-    if VARYING { C::Lane::default() } else { C::uniform(registers, number.into()) }
+fn uniform_unless<N: Number, C: ClassOf<N>, const VARYING: bool>(
+    registers: &Registers<N>,
+    number: u16,
+) -> Lane<N, C> {
+    if VARYING {
+        C::Lane::default()
+    } else {
+        C::uniform(registers, number.into())
+    }
 }
 
 struct BinaryLanes<O, const AV: bool, const BV: bool>(PhantomData<O>);
@@ -97,18 +112,41 @@ impl<N: Number, O: Binary<N>, const AV: bool, const BV: bool> Step<N> for Binary
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let one_a = uniform_unless::<N, O::A, AV>(&state.registers, instr.a);
         let one_b = uniform_unless::<N, O::B, BV>(&state.registers, instr.b);
-        let overlap = overlaps::<N, O::A, O::D>(AV, instr.a, instr.d) || overlaps::<N, O::B, O::D>(BV, instr.b, instr.d);
+        let overlap = overlaps::<N, O::A, O::D>(AV, instr.a, instr.d)
+            || overlaps::<N, O::B, O::D>(BV, instr.b, instr.d);
         for chunk in 0..state.chunks {
-            let (d, a, b) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.b, chunk));
+            let (d, a, b) = (
+                state.at(instr.d, chunk),
+                state.at(instr.a, chunk),
+                state.at(instr.b, chunk),
+            );
             if overlap {
-                let a = if AV { *O::A::lanes(&state.registers, a) } else { Lanes([one_a; LANES]) };
-                let b = if BV { *O::B::lanes(&state.registers, b) } else { Lanes([one_b; LANES]) };
-                map2(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, &b.0, O::eval);
+                let a = if AV {
+                    *O::A::lanes(&state.registers, a)
+                } else {
+                    Lanes([one_a; LANES])
+                };
+                let b = if BV {
+                    *O::B::lanes(&state.registers, b)
+                } else {
+                    Lanes([one_b; LANES])
+                };
+                map2(
+                    &mut O::D::lanes_mut(&mut state.registers, d).0,
+                    &a.0,
+                    &b.0,
+                    O::eval,
+                );
                 continue;
             }
             let (d, rest) = O::D::split(&mut state.registers, d);
             if AV && BV {
-                map2(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, O::eval);
+                map2(
+                    &mut d.0,
+                    &O::A::other(&rest, a).0,
+                    &O::B::other(&rest, b).0,
+                    O::eval,
+                );
             } else if AV {
                 map1(&mut d.0, &O::A::other(&rest, a).0, |a| O::eval(a, one_b));
             } else {
@@ -131,7 +169,9 @@ impl<N: Number, O: Binary<N>> Step<N> for BinaryUniform<O> {
 
 struct TernaryLanes<O, const AV: bool, const BV: bool, const CV: bool>(PhantomData<O>);
 
-impl<N: Number, O: Ternary<N>, const AV: bool, const BV: bool, const CV: bool> Step<N> for TernaryLanes<O, AV, BV, CV> {
+impl<N: Number, O: Ternary<N>, const AV: bool, const BV: bool, const CV: bool> Step<N>
+    for TernaryLanes<O, AV, BV, CV>
+{
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let one_a = uniform_unless::<N, O::A, AV>(&state.registers, instr.a);
@@ -141,23 +181,73 @@ impl<N: Number, O: Ternary<N>, const AV: bool, const BV: bool, const CV: bool> S
             || overlaps::<N, O::B, O::D>(BV, instr.b, instr.d)
             || overlaps::<N, O::C, O::D>(CV, instr.c, instr.d);
         for chunk in 0..state.chunks {
-            let (d, a, b, c) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.b, chunk), state.at(instr.c, chunk));
+            let (d, a, b, c) = (
+                state.at(instr.d, chunk),
+                state.at(instr.a, chunk),
+                state.at(instr.b, chunk),
+                state.at(instr.c, chunk),
+            );
             if overlap {
-                let a = if AV { *O::A::lanes(&state.registers, a) } else { Lanes([one_a; LANES]) };
-                let b = if BV { *O::B::lanes(&state.registers, b) } else { Lanes([one_b; LANES]) };
-                let c = if CV { *O::C::lanes(&state.registers, c) } else { Lanes([one_c; LANES]) };
-                map3(&mut O::D::lanes_mut(&mut state.registers, d).0, &a.0, &b.0, &c.0, O::eval);
+                let a = if AV {
+                    *O::A::lanes(&state.registers, a)
+                } else {
+                    Lanes([one_a; LANES])
+                };
+                let b = if BV {
+                    *O::B::lanes(&state.registers, b)
+                } else {
+                    Lanes([one_b; LANES])
+                };
+                let c = if CV {
+                    *O::C::lanes(&state.registers, c)
+                } else {
+                    Lanes([one_c; LANES])
+                };
+                map3(
+                    &mut O::D::lanes_mut(&mut state.registers, d).0,
+                    &a.0,
+                    &b.0,
+                    &c.0,
+                    O::eval,
+                );
                 continue;
             }
             let (d, rest) = O::D::split(&mut state.registers, d);
             match (AV, BV, CV) {
-                (true, true, true) => map3(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, &O::C::other(&rest, c).0, O::eval),
-                (true, true, false) => map2(&mut d.0, &O::A::other(&rest, a).0, &O::B::other(&rest, b).0, |a, b| O::eval(a, b, one_c)),
-                (true, false, true) => map2(&mut d.0, &O::A::other(&rest, a).0, &O::C::other(&rest, c).0, |a, c| O::eval(a, one_b, c)),
-                (false, true, true) => map2(&mut d.0, &O::B::other(&rest, b).0, &O::C::other(&rest, c).0, |b, c| O::eval(one_a, b, c)),
-                (true, false, false) => map1(&mut d.0, &O::A::other(&rest, a).0, |a| O::eval(a, one_b, one_c)),
-                (false, true, false) => map1(&mut d.0, &O::B::other(&rest, b).0, |b| O::eval(one_a, b, one_c)),
-                (false, false, _) => map1(&mut d.0, &O::C::other(&rest, c).0, |c| O::eval(one_a, one_b, c)),
+                (true, true, true) => map3(
+                    &mut d.0,
+                    &O::A::other(&rest, a).0,
+                    &O::B::other(&rest, b).0,
+                    &O::C::other(&rest, c).0,
+                    O::eval,
+                ),
+                (true, true, false) => map2(
+                    &mut d.0,
+                    &O::A::other(&rest, a).0,
+                    &O::B::other(&rest, b).0,
+                    |a, b| O::eval(a, b, one_c),
+                ),
+                (true, false, true) => map2(
+                    &mut d.0,
+                    &O::A::other(&rest, a).0,
+                    &O::C::other(&rest, c).0,
+                    |a, c| O::eval(a, one_b, c),
+                ),
+                (false, true, true) => map2(
+                    &mut d.0,
+                    &O::B::other(&rest, b).0,
+                    &O::C::other(&rest, c).0,
+                    |b, c| O::eval(one_a, b, c),
+                ),
+                (true, false, false) => map1(&mut d.0, &O::A::other(&rest, a).0, |a| {
+                    O::eval(a, one_b, one_c)
+                }),
+                (false, true, false) => map1(&mut d.0, &O::B::other(&rest, b).0, |b| {
+                    O::eval(one_a, b, one_c)
+                }),
+                (false, false, _) => map1(&mut d.0, &O::C::other(&rest, c).0, |c| {
+                    O::eval(one_a, one_b, c)
+                }),
             }
         }
     }
@@ -183,21 +273,38 @@ fn map1<A: Copy, D>(d: &mut [D; LANES], a: &[A; LANES], f: impl Fn(A) -> D) {
 }
 
 #[inline(always)]
-fn map2<A: Copy, B: Copy, D>(d: &mut [D; LANES], a: &[A; LANES], b: &[B; LANES], f: impl Fn(A, B) -> D) {
+fn map2<A: Copy, B: Copy, D>(
+    d: &mut [D; LANES],
+    a: &[A; LANES],
+    b: &[B; LANES],
+    f: impl Fn(A, B) -> D,
+) {
     for k in 0..LANES {
         d[k] = f(a[k], b[k]);
     }
 }
 
 #[inline(always)]
-fn map3<A: Copy, B: Copy, C: Copy, D>(d: &mut [D; LANES], a: &[A; LANES], b: &[B; LANES], c: &[C; LANES], f: impl Fn(A, B, C) -> D) {
+fn map3<A: Copy, B: Copy, C: Copy, D>(
+    d: &mut [D; LANES],
+    a: &[A; LANES],
+    b: &[B; LANES],
+    c: &[C; LANES],
+    f: impl Fn(A, B, C) -> D,
+) {
     for k in 0..LANES {
         d[k] = f(a[k], b[k], c[k]);
     }
 }
 
 /// Finds the handler of a copy: `masked` if only some lanes take part.
-pub(super) fn copy<N: Number>(tier: Tier, class: Class, from_varying: bool, to_varying: bool, masked: bool) -> Handler<N> {
+pub(super) fn copy<N: Number>(
+    tier: Tier,
+    class: Class,
+    from_varying: bool,
+    to_varying: bool,
+    masked: bool,
+) -> Handler<N> {
     use crate::registers::{Float, Int};
     match (class, to_varying, from_varying, masked) {
         (Class::Float, false, ..) => Handler::plain::<CopyUniform<Float>>(),
@@ -229,7 +336,11 @@ impl<N: Number, C: ClassOf<N>, const VARYING: bool> Step<N> for CopyLanes<C, VAR
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         for chunk in 0..state.chunks {
-            let a = if VARYING { *C::lanes(&state.registers, state.at(instr.a, chunk)) } else { Lanes([C::uniform(&state.registers, instr.a.into()); LANES]) };
+            let a = if VARYING {
+                *C::lanes(&state.registers, state.at(instr.a, chunk))
+            } else {
+                Lanes([C::uniform(&state.registers, instr.a.into()); LANES])
+            };
             let d = state.at(instr.d, chunk);
             *C::lanes_mut(&mut state.registers, d) = a;
         }
@@ -244,7 +355,11 @@ impl<N: Number, const VARYING: bool> Step<N> for CopyMaskedFloats<VARYING> {
         use crate::registers::{Float, Int};
         let one = uniform_unless::<N, Float, VARYING>(&state.registers, instr.a);
         for chunk in 0..state.chunks {
-            let (d, a, mask) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.c, chunk));
+            let (d, a, mask) = (
+                state.at(instr.d, chunk),
+                state.at(instr.a, chunk),
+                state.at(instr.c, chunk),
+            );
             if VARYING && a == d {
                 continue;
             }
@@ -268,7 +383,11 @@ impl<N: Number, const VARYING: bool> Step<N> for CopyMaskedInts<VARYING> {
         use crate::registers::Int;
         let one = uniform_unless::<N, Int, VARYING>(&state.registers, instr.a);
         for chunk in 0..state.chunks {
-            let (d, a, mask) = (state.at(instr.d, chunk), state.at(instr.a, chunk), state.at(instr.c, chunk));
+            let (d, a, mask) = (
+                state.at(instr.d, chunk),
+                state.at(instr.a, chunk),
+                state.at(instr.c, chunk),
+            );
             if VARYING && a == d {
                 continue;
             }
@@ -276,7 +395,9 @@ impl<N: Number, const VARYING: bool> Step<N> for CopyMaskedInts<VARYING> {
             let (d, rest) = <Int as ClassOf<N>>::split(&mut state.registers, d);
             if VARYING {
                 let a = <Int as ClassOf<N>>::other(&rest, a);
-                update2(&mut d.0, &a.0, &mask.0, |d, a, mask| (a & mask) | (d & !mask));
+                update2(&mut d.0, &a.0, &mask.0, |d, a, mask| {
+                    (a & mask) | (d & !mask)
+                });
             } else {
                 update1(&mut d.0, &mask.0, |d, mask| (one & mask) | (d & !mask));
             }
@@ -292,7 +413,12 @@ fn update1<D: Copy, A: Copy>(d: &mut [D; LANES], a: &[A; LANES], f: impl Fn(D, A
 }
 
 #[inline(always)]
-fn update2<D: Copy, A: Copy, B: Copy>(d: &mut [D; LANES], a: &[A; LANES], b: &[B; LANES], f: impl Fn(D, A, B) -> D) {
+fn update2<D: Copy, A: Copy, B: Copy>(
+    d: &mut [D; LANES],
+    a: &[A; LANES],
+    b: &[B; LANES],
+    f: impl Fn(D, A, B) -> D,
+) {
     for k in 0..LANES {
         d[k] = f(d[k], a[k], b[k]);
     }

@@ -45,8 +45,15 @@ impl Executor {
             .num_threads(threads)
             .thread_name(|index| format!("etalon-cpu-{index}"))
             .build()
-            .map_err(|error| RunError::Threads { reason: error.to_string() })?;
-        Ok(Self { pool, tier: Tier::best(), batch: LANES as u32, max_trips: Self::DEFAULT_MAX_TRIPS })
+            .map_err(|error| RunError::Threads {
+                reason: error.to_string(),
+            })?;
+        Ok(Self {
+            pool,
+            tier: Tier::best(),
+            batch: LANES as u32,
+            max_trips: Self::DEFAULT_MAX_TRIPS,
+        })
     }
 
     /// Runs on the given instruction set, or the baseline if the processor has it not.
@@ -103,8 +110,15 @@ pub(crate) struct Job<'a, N: Number> {
 }
 
 impl<N: Number> Job<'_, N> {
-    pub(crate) fn run(&self, executor: &Executor, workgroups: [u32; 3]) -> Result<DispatchCounters, DispatchFailure> {
-        let total = workgroups.iter().try_fold(1_u64, |total, &count| total.checked_mul(count.into())).ok_or(DispatchFailure::TooManyWorkgroups)?;
+    pub(crate) fn run(
+        &self,
+        executor: &Executor,
+        workgroups: [u32; 3],
+    ) -> Result<DispatchCounters, DispatchFailure> {
+        let total = workgroups
+            .iter()
+            .try_fold(1_u64, |total, &count| total.checked_mul(count.into()))
+            .ok_or(DispatchFailure::TooManyWorkgroups)?;
         if total == 0 {
             return Ok(DispatchCounters::default());
         }
@@ -113,7 +127,11 @@ impl<N: Number> Job<'_, N> {
         let failure = Mutex::new(None::<DispatchFailure>);
         // Small enough shares that no worker is left alone with the rest, large
         // enough that neighbours share cache lines of what they read.
-        let threads = if self.code.depends_on_order() { 1 } else { executor.threads() };
+        let threads = if self.code.depends_on_order() {
+            1
+        } else {
+            executor.threads()
+        };
         let share = (total / (threads as u64 * 16)).clamp(1, 64);
         let work = || {
             let result = self.work(executor, workgroups, total, share, &next, &stop);
@@ -129,7 +147,12 @@ impl<N: Number> Job<'_, N> {
         if threads == 1 {
             executor.pool.install(work);
         } else {
-            executor.pool.install(|| (0..threads).into_par_iter().with_max_len(1).for_each(|_| work()));
+            executor.pool.install(|| {
+                (0..threads)
+                    .into_par_iter()
+                    .with_max_len(1)
+                    .for_each(|_| work())
+            });
         }
         let failure = match failure.into_inner() {
             Ok(failure) => failure,
@@ -137,14 +160,29 @@ impl<N: Number> Job<'_, N> {
         };
         match failure {
             Some(failure) => Err(failure),
-            None => Ok(DispatchCounters { workgroups: total, invocations: total.saturating_mul(self.invocations.into()) }),
+            None => Ok(DispatchCounters {
+                workgroups: total,
+                invocations: total.saturating_mul(self.invocations.into()),
+            }),
         }
     }
 
     /// What one worker does: takes shares of the workgroups until none is left.
-    fn work(&self, executor: &Executor, workgroups: [u32; 3], total: u64, share: u64, next: &AtomicU64, stop: &AtomicBool) -> Result<(), DispatchFailure> {
+    fn work(
+        &self,
+        executor: &Executor,
+        workgroups: [u32; 3],
+        total: u64,
+        share: u64,
+        next: &AtomicU64,
+        stop: &AtomicBool,
+    ) -> Result<(), DispatchFailure> {
         let all_chunks = self.local_ids.active.len();
-        let most = if self.code.needs_whole_workgroup() { all_chunks } else { all_chunks.min(executor.batch as usize / LANES) };
+        let most = if self.code.needs_whole_workgroup() {
+            all_chunks
+        } else {
+            all_chunks.min(executor.batch as usize / LANES)
+        };
         let mut state: Option<State<'_, N>> = None;
         let [x, y, _] = workgroups.map(u64::from);
         loop {
@@ -158,7 +196,11 @@ impl<N: Number> Job<'_, N> {
             };
             for index in first..(first + share).min(total) {
                 // Each is below its count, which is 32 bits.
-                state.workgroup = [(index % x) as u32, (index / x % y) as u32, (index / (x * y)) as u32];
+                state.workgroup = [
+                    (index % x) as u32,
+                    (index / x % y) as u32,
+                    (index / (x * y)) as u32,
+                ];
                 state.workgroup_floats.fill(N::default());
                 state.workgroup_ints.fill(0);
                 let mut chunk = 0;
@@ -166,7 +208,9 @@ impl<N: Number> Job<'_, N> {
                     state.first_chunk = chunk;
                     state.chunks = most.min(all_chunks - chunk);
                     chunk += state.chunks;
-                    self.linked.run(state, executor.max_trips).map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
+                    self.linked
+                        .run(state, executor.max_trips)
+                        .map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
                 }
             }
         }
@@ -183,8 +227,12 @@ impl<N: Number> Job<'_, N> {
                 uniform_ints: allocate(ui)?,
             },
             chunks,
-            private_floats: allocate::<Lanes<N>>((resources.private.float as usize).saturating_mul(chunks))?,
-            private_ints: allocate::<Lanes<u32>>((resources.private.int as usize).saturating_mul(chunks))?,
+            private_floats: allocate::<Lanes<N>>(
+                (resources.private.float as usize).saturating_mul(chunks),
+            )?,
+            private_ints: allocate::<Lanes<u32>>(
+                (resources.private.int as usize).saturating_mul(chunks),
+            )?,
             workgroup_floats: allocate(resources.workgroup.float as usize)?,
             workgroup_ints: allocate(resources.workgroup.int as usize)?,
             code: self.code,
@@ -206,7 +254,9 @@ impl<N: Number> Job<'_, N> {
 
 fn allocate<T: Clone + Default>(count: usize) -> Result<Vec<T>, DispatchFailure> {
     let mut vec = Vec::new();
-    vec.try_reserve_exact(count).map_err(|_| DispatchFailure::OutOfMemory((count as u64).saturating_mul(size_of::<T>() as u64)))?;
+    vec.try_reserve_exact(count).map_err(|_| {
+        DispatchFailure::OutOfMemory((count as u64).saturating_mul(size_of::<T>() as u64))
+    })?;
     vec.resize(count, T::default());
     Ok(vec)
 }

@@ -13,11 +13,19 @@ use crate::num::{Number, mask};
 use crate::registers::LANES;
 
 pub(super) fn load<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
-    if varying { Handler::new::<Load<LANES>>(tier) } else { Handler::plain::<Load<1>>() }
+    if varying {
+        Handler::new::<Load<LANES>>(tier)
+    } else {
+        Handler::plain::<Load<1>>()
+    }
 }
 
 pub(super) fn query<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
-    if varying { Handler::new::<Query<LANES>>(tier) } else { Handler::plain::<Query<1>>() }
+    if varying {
+        Handler::new::<Query<LANES>>(tier)
+    } else {
+        Handler::plain::<Query<1>>()
+    }
 }
 
 pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a TextureView<'a>> {
@@ -32,20 +40,39 @@ pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// The indices of texels; coordinates are unsigned, so that negative ones are outside.
 #[inline(always)]
-fn locate<const K: usize>(level: Level, x: &[u32; K], y: &[u32; K], z: Option<&[u32; K]>, out: &mut [u32; K]) {
-    let Level { width, height, depth, start } = level;
+fn locate<const K: usize>(
+    level: Level,
+    x: &[u32; K],
+    y: &[u32; K],
+    z: Option<&[u32; K]>,
+    out: &mut [u32; K],
+) {
+    let Level {
+        width,
+        height,
+        depth,
+        start,
+    } = level;
     match z {
         Some(z) => {
             for k in 0..K {
                 let inside = mask((x[k] < width) & (y[k] < height) & (z[k] < depth));
-                let index = z[k].wrapping_mul(height).wrapping_add(y[k]).wrapping_mul(width).wrapping_add(x[k]).wrapping_add(start);
+                let index = z[k]
+                    .wrapping_mul(height)
+                    .wrapping_add(y[k])
+                    .wrapping_mul(width)
+                    .wrapping_add(x[k])
+                    .wrapping_add(start);
                 out[k] = index | !inside;
             }
         }
         None => {
             for k in 0..K {
                 let inside = mask((x[k] < width) & (y[k] < height));
-                let index = y[k].wrapping_mul(width).wrapping_add(x[k]).wrapping_add(start);
+                let index = y[k]
+                    .wrapping_mul(width)
+                    .wrapping_add(x[k])
+                    .wrapping_add(start);
                 out[k] = index | !inside;
             }
         }
@@ -54,9 +81,20 @@ fn locate<const K: usize>(level: Level, x: &[u32; K], y: &[u32; K], z: Option<&[
 
 /// The indices of the texels that an instruction's operands name.
 #[inline(always)]
-fn addresses<N: Number, const K: usize>(state: &State<'_, N>, texture: &TextureView<'_>, access: ImageAccess, operands: &[Slot], level: Option<Slot>, chunk: usize) -> [u32; K] {
-    let (x, y) = (state.ints(operands[0], chunk), state.ints(operands[1], chunk));
-    let z: Option<[u32; K]> = (access.coordinates == 3 || access.layered).then(|| state.ints(operands[2], chunk));
+fn addresses<N: Number, const K: usize>(
+    state: &State<'_, N>,
+    texture: &TextureView<'_>,
+    access: ImageAccess,
+    operands: &[Slot],
+    level: Option<Slot>,
+    chunk: usize,
+) -> [u32; K] {
+    let (x, y) = (
+        state.ints(operands[0], chunk),
+        state.ints(operands[1], chunk),
+    );
+    let z: Option<[u32; K]> =
+        (access.coordinates == 3 || access.layered).then(|| state.ints(operands[2], chunk));
     let mut out = [OUTSIDE; K];
     match level {
         Some(level) if level.varying => {
@@ -64,7 +102,13 @@ fn addresses<N: Number, const K: usize>(state: &State<'_, N>, texture: &TextureV
             for k in 0..K {
                 if let Some(&level) = texture.levels.get(levels[k] as usize) {
                     let mut one = [OUTSIDE; 1];
-                    locate(level, &[x[k]], &[y[k]], z.map(|z| [z[k]]).as_ref(), &mut one);
+                    locate(
+                        level,
+                        &[x[k]],
+                        &[y[k]],
+                        z.map(|z| [z[k]]).as_ref(),
+                        &mut one,
+                    );
                     out[k] = one[0];
                 }
             }
@@ -86,22 +130,30 @@ pub(super) fn gather<const K: usize>(texels: &Texels, index: &[u32; K], words: &
     match texels {
         Texels::B1(texels) => {
             for k in 0..K {
-                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+                low[k] = texels
+                    .get(index[k] as usize)
+                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
             }
         }
         Texels::B2(texels) => {
             for k in 0..K {
-                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+                low[k] = texels
+                    .get(index[k] as usize)
+                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
             }
         }
         Texels::B4(texels) => {
             for k in 0..K {
-                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed).into());
+                low[k] = texels
+                    .get(index[k] as usize)
+                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
             }
         }
         Texels::B8(texels) => {
             for k in 0..K {
-                low[k] = texels.get(index[k] as usize).map_or(0, |texel| texel.load(Ordering::Relaxed));
+                low[k] = texels
+                    .get(index[k] as usize)
+                    .map_or(0, |texel| texel.load(Ordering::Relaxed));
             }
         }
         Texels::B16(texels) => {
@@ -128,9 +180,17 @@ impl<N: Number, const K: usize> Step<N> for Load<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::ImageLoad { access, level, .. } = inst.op else { return };
-        let Some(texture) = texture(state, access.image) else { return };
-        let level = if level { inst.operands.last().copied() } else { None };
+        let Op::ImageLoad { access, level, .. } = inst.op else {
+            return;
+        };
+        let Some(texture) = texture(state, access.image) else {
+            return;
+        };
+        let level = if level {
+            inst.operands.last().copied()
+        } else {
+            None
+        };
         let format = texture.desc().format;
         let wanted = wanted(inst);
         for chunk in 0..rounds::<N, K>(state) {
@@ -160,8 +220,12 @@ impl<N: Number> Step<N> for Store {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::ImageStore { access, .. } = inst.op else { return };
-        let Some(texture) = texture(state, access.image) else { return };
+        let Op::ImageStore { access, .. } = inst.op else {
+            return;
+        };
+        let Some(texture) = texture(state, access.image) else {
+            return;
+        };
         let (coordinates, value) = inst.operands.split_at(inst.operands.len() - 4);
         for chunk in 0..state.chunks {
             let mut index = addresses::<N, LANES>(state, texture, access, coordinates, None, chunk);
@@ -230,12 +294,23 @@ impl<N: Number, const K: usize> Step<N> for Query<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::ImageQuery { image, query }, Some(Some(to))) = (inst.op, inst.results.first().copied()) else { return };
-        let Some(texture) = texture(state, image) else { return };
+        let (Op::ImageQuery { image, query }, Some(Some(to))) =
+            (inst.op, inst.results.first().copied())
+        else {
+            return;
+        };
+        let Some(texture) = texture(state, image) else {
+            return;
+        };
         for chunk in 0..rounds::<N, K>(state) {
-            let level: [u32; K] = inst.operands.first().map_or([0; K], |&slot| state.ints(slot, chunk));
+            let level: [u32; K] = inst
+                .operands
+                .first()
+                .map_or([0; K], |&slot| state.ints(slot, chunk));
             let answer = level.map(|level| match query {
-                ImageQuery::Size(axis) => texture.levels.get(level as usize).map_or(0, |level| [level.width, level.height, level.depth][usize::from(axis.min(2))]),
+                ImageQuery::Size(axis) => texture.levels.get(level as usize).map_or(0, |level| {
+                    [level.width, level.height, level.depth][usize::from(axis.min(2))]
+                }),
                 ImageQuery::Levels => texture.desc().mips,
                 ImageQuery::Layers => match texture.desc().dimension {
                     etalon_core::resource::Dimension::Cube => texture.desc().layers() / 6,

@@ -35,7 +35,12 @@ impl<N: Number> Linked<N> {
             .map(|(index, inst)| {
                 let operand = |i: usize| inst.operands.get(i).map_or(0, |slot| slot.number);
                 let instr = Instr {
-                    d: inst.results.first().copied().flatten().map_or(0, |slot| slot.number),
+                    d: inst
+                        .results
+                        .first()
+                        .copied()
+                        .flatten()
+                        .map_or(0, |slot| slot.number),
                     a: operand(0),
                     b: operand(1),
                     c: inst.mask.map_or_else(|| operand(2), |mask| mask.number),
@@ -66,10 +71,18 @@ impl<N: Number> Linked<N> {
             next = match block.end {
                 End::Jump(next) => next,
                 End::Branch { condition, yes, no } => {
-                    if state.registers.uniform_ints[usize::from(condition.number)] != 0 { yes } else { no }
+                    if state.registers.uniform_ints[usize::from(condition.number)] != 0 {
+                        yes
+                    } else {
+                        no
+                    }
                 }
                 End::Any { mask, yes, no } => {
-                    if state.any(mask) { yes } else { no }
+                    if state.any(mask) {
+                        yes
+                    } else {
+                        no
+                    }
                 }
                 End::Enter { counter, head } => {
                     state.trips[counter as usize] = 0;
@@ -98,9 +111,18 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
     match inst.op {
         Op::Arith(op) => {
             let varying: Vec<bool> = inst.operands.iter().map(|slot| slot.varying).collect();
-            op.visit(Select { tier, varying: &varying })
+            op.visit(Select {
+                tier,
+                varying: &varying,
+            })
         }
-        Op::Move(class) => arith::copy(tier, class, inst.operands[0].varying, varying_result, inst.mask.is_some()),
+        Op::Move(class) => arith::copy(
+            tier,
+            class,
+            inst.operands[0].varying,
+            varying_result,
+            inst.mask.is_some(),
+        ),
         Op::Input(_) => Handler::plain::<memory::InputStep>(),
         Op::Table { .. } => memory::table(tier, varying_result),
         Op::BufferLoad { .. } => memory::buffer_load(tier, varying_result),
@@ -128,8 +150,14 @@ impl<N: Number> Step<N> for Barrier {
         for chunk in 0..state.chunks {
             let active = state.local_ids.active[state.first_chunk + chunk].0;
             let mask = state.mask(inst, chunk);
-            if active.iter().zip(&mask).any(|(active, mask)| active & !mask != 0) {
-                state.failure.get_or_insert(Failure::DivergentBarrier(instr.index));
+            if active
+                .iter()
+                .zip(&mask)
+                .any(|(active, mask)| active & !mask != 0)
+            {
+                state
+                    .failure
+                    .get_or_insert(Failure::DivergentBarrier(instr.index));
             }
         }
     }

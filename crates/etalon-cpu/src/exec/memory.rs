@@ -26,7 +26,9 @@ impl<N: Number> Step<N> for InputStep {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::Input(input), Some(to)) = (inst.op, result(inst)) else { return };
+        let (Op::Input(input), Some(to)) = (inst.op, result(inst)) else {
+            return;
+        };
         let axis = |axis: u8| usize::from(axis.min(2));
         let lanes = match input {
             Input::LocalId(a) => &state.local_ids.ids[axis(a)],
@@ -46,7 +48,11 @@ impl<N: Number> Step<N> for InputStep {
 macro_rules! by_width {
     ($name:ident, $step:ident) => {
         pub(super) fn $name<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
-            if varying { Handler::new::<$step<LANES>>(tier) } else { Handler::plain::<$step<1>>() }
+            if varying {
+                Handler::new::<$step<LANES>>(tier)
+            } else {
+                Handler::plain::<$step<1>>()
+            }
         }
     };
 }
@@ -61,11 +67,17 @@ impl<N: Number, const K: usize> Step<N> for Table<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::Table { table, .. }, Some(to)) = (inst.op, result(inst)) else { return };
+        let (Op::Table { table, .. }, Some(to)) = (inst.op, result(inst)) else {
+            return;
+        };
         let table = &state.code.resources.tables[table as usize];
         for chunk in 0..rounds::<N, K>(state) {
             let index: [u32; K] = state.ints(inst.operands[0], chunk);
-            state.set_bits::<K>(to, chunk, &index.map(|index| table.get(index as usize).copied().unwrap_or(0)));
+            state.set_bits::<K>(
+                to,
+                chunk,
+                &index.map(|index| table.get(index as usize).copied().unwrap_or(0)),
+            );
         }
     }
 }
@@ -79,9 +91,16 @@ fn words<'a, N>(state: &State<'a, N>, buffer: u16) -> (&'a [AtomicU32], u64) {
 
 /// The words' indices: a fixed part, and a computed one if there is an operand.
 #[inline(always)]
-fn indices<N: Number, const K: usize>(state: &State<'_, N>, offset: u32, computed: Option<&Slot>, chunk: usize) -> [usize; K] {
+fn indices<N: Number, const K: usize>(
+    state: &State<'_, N>,
+    offset: u32,
+    computed: Option<&Slot>,
+    chunk: usize,
+) -> [usize; K] {
     match computed {
-        Some(&slot) => state.ints::<K>(slot, chunk).map(|index| offset as usize + index as usize),
+        Some(&slot) => state
+            .ints::<K>(slot, chunk)
+            .map(|index| offset as usize + index as usize),
         None => [offset as usize; K],
     }
 }
@@ -92,13 +111,23 @@ impl<N: Number, const K: usize> Step<N> for BufferLoad<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::BufferLoad { buffer, offset, .. }, Some(to)) = (inst.op, result(inst)) else { return };
+        let (Op::BufferLoad { buffer, offset, .. }, Some(to)) = (inst.op, result(inst)) else {
+            return;
+        };
         let (words, _) = words(state, buffer);
         for chunk in 0..rounds::<N, K>(state) {
             let index = indices::<N, K>(state, offset, inst.operands.first(), chunk);
             // Indices are clamped where they are computed; this is for buffers
             // that are smaller than declared.
-            state.set_bits::<K>(to, chunk, &index.map(|index| words.get(index).map_or(0, |word| word.load(Ordering::Relaxed))));
+            state.set_bits::<K>(
+                to,
+                chunk,
+                &index.map(|index| {
+                    words
+                        .get(index)
+                        .map_or(0, |word| word.load(Ordering::Relaxed))
+                }),
+            );
         }
     }
 }
@@ -109,7 +138,9 @@ impl<N: Number> Step<N> for BufferStore {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::BufferStore { buffer, offset, .. } = inst.op else { return };
+        let Op::BufferStore { buffer, offset, .. } = inst.op else {
+            return;
+        };
         let (words, _) = words(state, buffer);
         for chunk in 0..state.chunks {
             let mask = state.mask(inst, chunk);
@@ -132,7 +163,17 @@ impl<N: Number> Step<N> for BufferLength {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::BufferLength { buffer, offset, stride }, Some(to)) = (inst.op, result(inst)) else { return };
+        let (
+            Op::BufferLength {
+                buffer,
+                offset,
+                stride,
+            },
+            Some(to),
+        ) = (inst.op, result(inst))
+        else {
+            return;
+        };
         let (_, bytes) = words(state, buffer);
         let length = bytes.saturating_sub(offset.into()) / u64::from(stride.max(1));
         state.set_ints(to, 0, &[u32::try_from(length).unwrap_or(u32::MAX)]);
@@ -144,7 +185,14 @@ pub(super) struct BufferAtomic;
 impl<N: Number> Step<N> for BufferAtomic {
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::BufferAtomic { buffer, offset, function } = inst.op else { return };
+        let Op::BufferAtomic {
+            buffer,
+            offset,
+            function,
+        } = inst.op
+        else {
+            return;
+        };
         let (words, _) = words(state, buffer);
         atomic(state, inst, function, |_, index, first, second| {
             let word = words.get(offset as usize + index as usize)?;
@@ -158,9 +206,13 @@ pub(super) struct WorkgroupAtomic;
 impl<N: Number> Step<N> for WorkgroupAtomic {
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::WorkgroupAtomic { slot, function } = inst.op else { return };
+        let Op::WorkgroupAtomic { slot, function } = inst.op else {
+            return;
+        };
         atomic(state, inst, function, |state, index, first, second| {
-            let word = state.workgroup_ints.get_mut(slot as usize + index as usize)?;
+            let word = state
+                .workgroup_ints
+                .get_mut(slot as usize + index as usize)?;
             let old = *word;
             *word = combine(function, old, first, second);
             Some(old)
@@ -169,13 +221,25 @@ impl<N: Number> Step<N> for WorkgroupAtomic {
 }
 
 /// One active lane after the other.
-fn atomic<'a, N: Number>(state: &mut State<'a, N>, inst: &CodeInst, function: AtomicFunction, mut apply: impl FnMut(&mut State<'a, N>, u32, u32, u32) -> Option<u32>) {
-    let values = if function == AtomicFunction::CompareExchange { 2 } else { 1 };
+fn atomic<'a, N: Number>(
+    state: &mut State<'a, N>,
+    inst: &CodeInst,
+    function: AtomicFunction,
+    mut apply: impl FnMut(&mut State<'a, N>, u32, u32, u32) -> Option<u32>,
+) {
+    let values = if function == AtomicFunction::CompareExchange {
+        2
+    } else {
+        1
+    };
     for chunk in 0..state.chunks {
         let mask = state.mask(inst, chunk);
         let first: [u32; LANES] = state.ints(inst.operands[0], chunk);
         let second: [u32; LANES] = state.ints(inst.operands[values - 1], chunk);
-        let index: [u32; LANES] = inst.operands.get(values).map_or([0; LANES], |&slot| state.ints(slot, chunk));
+        let index: [u32; LANES] = inst
+            .operands
+            .get(values)
+            .map_or([0; LANES], |&slot| state.ints(slot, chunk));
         let mut old = [0; LANES];
         for k in 0..LANES {
             if mask[k] != 0 {
@@ -209,7 +273,11 @@ fn combine(function: AtomicFunction, old: u32, first: u32, second: u32) -> u32 {
         AtomicFunction::MaxU => old.max(first),
         AtomicFunction::Exchange => first,
         AtomicFunction::CompareExchange => {
-            if old == first { second } else { old }
+            if old == first {
+                second
+            } else {
+                old
+            }
         }
     }
 }
@@ -220,25 +288,52 @@ impl<N: Number, const K: usize> Step<N> for MemoryLoad<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let (Op::MemoryLoad { memory, slot, class }, Some(to)) = (inst.op, result(inst)) else { return };
+        let (
+            Op::MemoryLoad {
+                memory,
+                slot,
+                class,
+            },
+            Some(to),
+        ) = (inst.op, result(inst))
+        else {
+            return;
+        };
         let chunks = state.chunks;
         for chunk in 0..rounds::<N, K>(state) {
             let index = indices::<N, K>(state, slot, inst.operands.first(), chunk);
             match (memory, class) {
                 (Memory::Workgroup, Class::Float) => {
-                    let lanes = index.map(|index| state.workgroup_floats.get(index).copied().unwrap_or_default());
+                    let lanes = index.map(|index| {
+                        state
+                            .workgroup_floats
+                            .get(index)
+                            .copied()
+                            .unwrap_or_default()
+                    });
                     state.set_floats(to, chunk, &lanes);
                 }
                 (Memory::Workgroup, Class::Int) => {
-                    let lanes = index.map(|index| state.workgroup_ints.get(index).copied().unwrap_or(0));
+                    let lanes =
+                        index.map(|index| state.workgroup_ints.get(index).copied().unwrap_or(0));
                     state.set_ints(to, chunk, &lanes);
                 }
                 (Memory::Private, Class::Float) => {
-                    let lanes: [N; K] = std::array::from_fn(|k| state.private_floats.get(index[k] * chunks + chunk).map_or_else(N::default, |lanes| lanes.0[k]));
+                    let lanes: [N; K] = std::array::from_fn(|k| {
+                        state
+                            .private_floats
+                            .get(index[k] * chunks + chunk)
+                            .map_or_else(N::default, |lanes| lanes.0[k])
+                    });
                     state.set_floats(to, chunk, &lanes);
                 }
                 (Memory::Private, Class::Int) => {
-                    let lanes: [u32; K] = std::array::from_fn(|k| state.private_ints.get(index[k] * chunks + chunk).map_or(0, |lanes| lanes.0[k]));
+                    let lanes: [u32; K] = std::array::from_fn(|k| {
+                        state
+                            .private_ints
+                            .get(index[k] * chunks + chunk)
+                            .map_or(0, |lanes| lanes.0[k])
+                    });
                     state.set_ints(to, chunk, &lanes);
                 }
             }
@@ -252,7 +347,14 @@ impl<N: Number> Step<N> for MemoryStore {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::MemoryStore { memory, slot, class } = inst.op else { return };
+        let Op::MemoryStore {
+            memory,
+            slot,
+            class,
+        } = inst.op
+        else {
+            return;
+        };
         let chunks = state.chunks;
         for chunk in 0..chunks {
             let mask = state.mask(inst, chunk);
@@ -263,7 +365,10 @@ impl<N: Number> Step<N> for MemoryStore {
                     for k in (0..LANES).filter(|&k| mask[k] != 0) {
                         let word = match memory {
                             Memory::Workgroup => state.workgroup_floats.get_mut(index[k]),
-                            Memory::Private => state.private_floats.get_mut(index[k] * chunks + chunk).map(|lanes| &mut lanes.0[k]),
+                            Memory::Private => state
+                                .private_floats
+                                .get_mut(index[k] * chunks + chunk)
+                                .map(|lanes| &mut lanes.0[k]),
                         };
                         if let Some(word) = word {
                             *word = value[k];
@@ -275,7 +380,10 @@ impl<N: Number> Step<N> for MemoryStore {
                     for k in (0..LANES).filter(|&k| mask[k] != 0) {
                         let word = match memory {
                             Memory::Workgroup => state.workgroup_ints.get_mut(index[k]),
-                            Memory::Private => state.private_ints.get_mut(index[k] * chunks + chunk).map(|lanes| &mut lanes.0[k]),
+                            Memory::Private => state
+                                .private_ints
+                                .get_mut(index[k] * chunks + chunk)
+                                .map(|lanes| &mut lanes.0[k]),
                         };
                         if let Some(word) = word {
                             *word = value[k];

@@ -5,6 +5,9 @@
 //! over the number type and compiled once per instruction set; a program is
 //! linked to the handlers of one set and then is a list of calls.
 
+// Loops over lanes index several arrays of lanes alike.
+#![allow(clippy::needless_range_loop)]
+
 mod arith;
 mod dispatch;
 mod image;

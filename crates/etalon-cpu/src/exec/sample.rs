@@ -17,7 +17,11 @@ use crate::num::Number;
 use crate::registers::LANES;
 
 pub(super) fn sample<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
-    if varying { Handler::new::<Sample<LANES>>(tier) } else { Handler::plain::<Sample<1>>() }
+    if varying {
+        Handler::new::<Sample<LANES>>(tier)
+    } else {
+        Handler::plain::<Sample<1>>()
+    }
 }
 
 struct Sample<const K: usize>;
@@ -26,16 +30,41 @@ impl<N: Number, const K: usize> Step<N> for Sample<K> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        let Op::ImageSample { access, sampler } = inst.op else { return };
-        let Some(texture) = texture(state, access.image) else { return };
-        let Some(&Resource::Sampler(sampler)) = state.resources.get(usize::from(sampler)) else { return };
+        let Op::ImageSample { access, sampler } = inst.op else {
+            return;
+        };
+        let Some(texture) = texture(state, access.image) else {
+            return;
+        };
+        let Some(&Resource::Sampler(sampler)) = state.resources.get(usize::from(sampler)) else {
+            return;
+        };
         let coordinates = usize::from(access.coordinates);
         for chunk in 0..rounds::<N, K>(state) {
             let floats = |i: usize| state.floats::<K>(inst.operands[i], chunk).map(N::to_f32);
-            let position = [floats(0), floats(1), if coordinates == 3 { floats(2) } else { [0.0; K] }];
-            let layer = if access.layered { state.ints(inst.operands[coordinates], chunk) } else { [0; K] };
+            let position = [
+                floats(0),
+                floats(1),
+                if coordinates == 3 {
+                    floats(2)
+                } else {
+                    [0.0; K]
+                },
+            ];
+            let layer = if access.layered {
+                state.ints(inst.operands[coordinates], chunk)
+            } else {
+                [0; K]
+            };
             let lod = floats(coordinates + usize::from(access.layered));
-            let request = Request { texture, sampler, wanted: wanted(inst), layer, cube: access.cube, volume: coordinates == 3 && !access.cube };
+            let request = Request {
+                texture,
+                sampler,
+                wanted: wanted(inst),
+                layer,
+                cube: access.cube,
+                volume: coordinates == 3 && !access.cube,
+            };
             let channels = request.run(&position, &lod);
             for (result, channel) in inst.results.iter().zip(&channels) {
                 if let Some(to) = *result {
@@ -62,23 +91,38 @@ impl<const K: usize> Request<'_, K> {
         let last = self.texture.levels.len() as i32 - 1;
         let top = last as f32;
         // NaN becomes 0.
-        let lod = lod.map(|lod| if lod > 0.0 { if lod < top { lod } else { top } } else { 0.0 });
+        let lod = lod.map(|lod| {
+            if lod > 0.0 {
+                if lod < top { lod } else { top }
+            } else {
+                0.0
+            }
+        });
         let (level, weight): ([i32; K], [f32; K]) = match self.sampler.mip_filter {
             // Half way goes to the finer level.
-            Filter::Nearest => (lod.map(|lod| ((lod + 0.5).ceil() as i32 - 1).clamp(0, last)), [0.0; K]),
+            Filter::Nearest => (
+                lod.map(|lod| ((lod + 0.5).ceil() as i32 - 1).clamp(0, last)),
+                [0.0; K],
+            ),
             Filter::Linear => {
-                let fine = lod.map(|lod| lod as i32);
+                let fine = lod.map(Number::to_i32);
                 (fine, std::array::from_fn(|k| lod[k] - fine[k] as f32))
             }
         };
-        let levels = if weight.iter().any(|&weight| weight > 0.0) { 2 } else { 1 };
+        let levels = if weight.iter().any(|&weight| weight > 0.0) {
+            2
+        } else {
+            1
+        };
         let mut sum = [[0.0; K]; 4];
         for step in 0..levels {
             let scale = weight.map(|weight| if step == 1 { weight } else { 1.0 - weight });
             let level = level.map(|level| (level + step).min(last));
             let flat = !self.cube && !self.volume;
             match self.texture.levels.get(level[0] as usize) {
-                Some(&one) if flat && level.iter().fold(0, |all, other| all | (other ^ level[0])) == 0 => {
+                Some(&one)
+                    if flat && level.iter().fold(0, |all, other| all | (other ^ level[0])) == 0 =>
+                {
                     self.add_flat(one, &scale, [&position[0], &position[1]], &mut sum);
                 }
                 _ => self.add_level(&level, &scale, position, &mut sum),
@@ -89,8 +133,19 @@ impl<const K: usize> Request<'_, K> {
 
     /// Adds what one level of a flat texture has at `position`, times `scale`.
     #[inline(always)]
-    fn add_flat(&self, level: Level, scale: &[f32; K], position: [&[f32; K]; 2], sum: &mut [[f32; K]; 4]) {
-        let Level { width, height, depth, start } = level;
+    fn add_flat(
+        &self,
+        level: Level,
+        scale: &[f32; K],
+        position: [&[f32; K]; 2],
+        sum: &mut [[f32; K]; 4],
+    ) {
+        let Level {
+            width,
+            height,
+            depth,
+            start,
+        } = level;
         let linear = self.sampler.filter == Filter::Linear;
         let (x, fx) = self.axis(position[0], &[width; K]);
         let (y, fy) = self.axis(position[1], &[height; K]);
@@ -147,7 +202,12 @@ impl<const K: usize> Request<'_, K> {
         let mut words = [[0; K]; 2];
         gather(self.texture.texels, index, &mut words);
         let mut channels = [[0; K]; 4];
-        decode(self.texture.desc().format, &words, self.wanted, &mut channels);
+        decode(
+            self.texture.desc().format,
+            &words,
+            self.wanted,
+            &mut channels,
+        );
         for (channel, sum) in sum.iter_mut().enumerate() {
             if self.wanted[channel] {
                 for k in 0..K {
@@ -159,8 +219,25 @@ impl<const K: usize> Request<'_, K> {
 
     /// Adds what a level has at `position`, times `scale`.
     #[inline(always)]
-    fn add_level(&self, level: &[i32; K], scale: &[f32; K], position: &[[f32; K]; 3], sum: &mut [[f32; K]; 4]) {
-        let levels: [Level; K] = std::array::from_fn(|k| self.texture.levels.get(level[k] as usize).copied().unwrap_or(Level { width: 1, height: 1, depth: 1, start: 0 }));
+    fn add_level(
+        &self,
+        level: &[i32; K],
+        scale: &[f32; K],
+        position: &[[f32; K]; 3],
+        sum: &mut [[f32; K]; 4],
+    ) {
+        let levels: [Level; K] = std::array::from_fn(|k| {
+            self.texture
+                .levels
+                .get(level[k] as usize)
+                .copied()
+                .unwrap_or(Level {
+                    width: 1,
+                    height: 1,
+                    depth: 1,
+                    start: 0,
+                })
+        });
         let (mut u, mut v, mut face) = (position[0], position[1], [0; K]);
         if self.cube {
             for k in 0..K {
@@ -170,11 +247,26 @@ impl<const K: usize> Request<'_, K> {
         }
         let x = self.axis(&u, &levels.map(|level| level.width));
         let y = self.axis(&v, &levels.map(|level| level.height));
-        let z = if self.volume { self.axis(&position[2], &levels.map(|level| level.depth)) } else { ([0; K], [0.0; K]) };
-        let taps = if self.sampler.filter == Filter::Linear { 2 } else { 1 };
+        let z = if self.volume {
+            self.axis(&position[2], &levels.map(|level| level.depth))
+        } else {
+            ([0; K], [0.0; K])
+        };
+        let taps = if self.sampler.filter == Filter::Linear {
+            2
+        } else {
+            1
+        };
         let taps = taps * taps * if self.volume { taps } else { 1 };
         for tap in 0..taps {
-            self.add_texels([tap & 1, tap >> 1 & 1, tap >> 2], &levels, scale, [&x, &y, &z], &face, sum);
+            self.add_texels(
+                [tap & 1, tap >> 1 & 1, tap >> 2],
+                &levels,
+                scale,
+                [&x, &y, &z],
+                &face,
+                sum,
+            );
         }
     }
 
@@ -186,7 +278,7 @@ impl<const K: usize> Request<'_, K> {
         for k in 0..K {
             let scaled = coordinate[k] * size[k] as f32 - if linear { 0.5 } else { 0.0 };
             let floor = scaled.floor();
-            first[k] = floor as i32;
+            first[k] = Number::to_i32(floor);
             weight[k] = if linear { scaled - floor } else { 0.0 };
         }
         (first, weight)
@@ -194,17 +286,35 @@ impl<const K: usize> Request<'_, K> {
 
     /// Adds one of the texels around the positions, times its weight.
     #[inline(always)]
-    fn add_texels(&self, offset: [i32; 3], levels: &[Level; K], scale: &[f32; K], axes: [&([i32; K], [f32; K]); 3], face: &[u32; K], sum: &mut [[f32; K]; 4]) {
+    fn add_texels(
+        &self,
+        offset: [i32; 3],
+        levels: &[Level; K],
+        scale: &[f32; K],
+        axes: [&([i32; K], [f32; K]); 3],
+        face: &[u32; K],
+        sum: &mut [[f32; K]; 4],
+    ) {
         let (mut index, mut weight) = ([0; K], *scale);
         for k in 0..K {
-            let Level { width, height, depth, start } = levels[k];
-            let [x, y, z]: [i32; 3] = std::array::from_fn(|axis| axes[axis].0[k].saturating_add(offset[axis]));
+            let Level {
+                width,
+                height,
+                depth,
+                start,
+            } = levels[k];
+            let [x, y, z]: [i32; 3] =
+                std::array::from_fn(|axis| axes[axis].0[k].saturating_add(offset[axis]));
             let (x, y, layer) = if self.cube {
                 let (face, x, y) = cube_texel(face[k], x, y, width as i32);
                 let cubes = depth / 6;
                 (x, y, self.layer[k].min(cubes.saturating_sub(1)) * 6 + face)
             } else {
-                let layer = if self.volume { self.address(z, depth) } else { (self.layer[k] as i32).clamp(0, depth as i32 - 1) as u32 };
+                let layer = if self.volume {
+                    self.address(z, depth)
+                } else {
+                    (self.layer[k] as i32).clamp(0, depth as i32 - 1) as u32
+                };
                 (self.address(x, width), self.address(y, height), layer)
             };
             index[k] = start + (layer * height + y) * width + x;
@@ -239,9 +349,17 @@ fn cube_face(direction: [f32; 3]) -> (u32, [f32; 2]) {
     let [x, y, z] = direction;
     let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
     let (face, s, t, major) = if az >= ax && az >= ay {
-        if z >= 0.0 { (4, x, -y, az) } else { (5, -x, -y, az) }
+        if z >= 0.0 {
+            (4, x, -y, az)
+        } else {
+            (5, -x, -y, az)
+        }
     } else if ay >= ax {
-        if y >= 0.0 { (2, x, z, ay) } else { (3, x, -z, ay) }
+        if y >= 0.0 {
+            (2, x, z, ay)
+        } else {
+            (3, x, -z, ay)
+        }
     } else if x >= 0.0 {
         (0, -z, -y, ax)
     } else {

@@ -32,7 +32,13 @@ impl LocalIds {
         let count = size[0] * size[1] * size[2];
         let chunks = (count as usize).div_ceil(LANES);
         let lanes = |value: &dyn Fn(u32) -> u32| -> Vec<Lanes<u32>> {
-            (0..chunks).map(|chunk| Lanes(std::array::from_fn(|lane| value((chunk * LANES + lane) as u32)))).collect()
+            (0..chunks)
+                .map(|chunk| {
+                    Lanes(std::array::from_fn(|lane| {
+                        value((chunk * LANES + lane) as u32)
+                    }))
+                })
+                .collect()
         };
         // Lanes past the end repeat the last invocation: whatever they compute,
         // they compute on sensible values.
@@ -117,7 +123,9 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn bits<const K: usize>(&self, slot: Slot, chunk: usize) -> [u32; K] {
         match slot.class {
             Class::Int => self.ints(slot, chunk),
-            Class::Float => self.floats::<K>(slot, chunk).map(|lane| lane.to_f32().to_bits()),
+            Class::Float => self
+                .floats::<K>(slot, chunk)
+                .map(|lane| lane.to_f32().to_bits()),
         }
     }
 
@@ -145,7 +153,11 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn set_bits<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[u32; K]) {
         match slot.class {
             Class::Int => self.set_ints(slot, chunk, lanes),
-            Class::Float => self.set_floats(slot, chunk, &lanes.map(|bits| N::from_f32(f32::from_bits(bits)))),
+            Class::Float => self.set_floats(
+                slot,
+                chunk,
+                &lanes.map(|bits| N::from_f32(f32::from_bits(bits))),
+            ),
         }
     }
 
@@ -164,7 +176,9 @@ impl<'a, N: Number> State<'a, N> {
             return self.registers.uniform_ints[usize::from(mask.number)] != 0;
         }
         let first = self.at(mask.number, 0);
-        self.registers.ints[first..first + self.chunks].iter().any(|lanes| lanes.0.iter().fold(0, |all, lane| all | lane) != 0)
+        self.registers.ints[first..first + self.chunks]
+            .iter()
+            .any(|lanes| lanes.0.iter().fold(0, |all, lane| all | lane) != 0)
     }
 }
 

@@ -47,13 +47,21 @@ impl Tier {
     /// The largest one this processor has.
     #[must_use]
     pub fn best() -> Self {
-        Self::ALL.into_iter().rev().find(|tier| tier.is_available()).unwrap_or(Self::Baseline)
+        Self::ALL
+            .into_iter()
+            .rev()
+            .find(|tier| tier.is_available())
+            .unwrap_or(Self::Baseline)
     }
 
     /// This one if the processor has it, the baseline otherwise.
     #[must_use]
     pub fn or_baseline(self) -> Self {
-        if self.is_available() { self } else { Self::Baseline }
+        if self.is_available() {
+            self
+        } else {
+            Self::Baseline
+        }
     }
 }
 

@@ -218,7 +218,12 @@ impl Arith {
             Self::ExpF | Self::Exp2F | Self::LogF | Self::Log2F | Self::SinF | Self::CosF => 10,
             Self::PowF => 20,
             Self::TanF | Self::AsinF | Self::AcosF | Self::AtanF | Self::Atan2F => 30,
-            Self::SinhF | Self::CoshF | Self::TanhF | Self::AsinhF | Self::AcoshF | Self::AtanhF => 40,
+            Self::SinhF
+            | Self::CoshF
+            | Self::TanhF
+            | Self::AsinhF
+            | Self::AcoshF
+            | Self::AtanhF => 40,
             _ => 1,
         }
     }
@@ -227,9 +232,24 @@ impl Arith {
     pub(crate) fn commutes(self) -> bool {
         matches!(
             self,
-            Self::AddF | Self::MulF | Self::MulAddF | Self::MulSubF | Self::SubMulF | Self::EqF | Self::NeF
-                | Self::EqI | Self::NeI | Self::AddI | Self::MulI | Self::And | Self::Or | Self::Xor
-                | Self::MinS | Self::MaxS | Self::MinU | Self::MaxU
+            Self::AddF
+                | Self::MulF
+                | Self::MulAddF
+                | Self::MulSubF
+                | Self::SubMulF
+                | Self::EqF
+                | Self::NeF
+                | Self::EqI
+                | Self::NeI
+                | Self::AddI
+                | Self::MulI
+                | Self::And
+                | Self::Or
+                | Self::Xor
+                | Self::MinS
+                | Self::MaxS
+                | Self::MinU
+                | Self::MaxU
         )
     }
 }

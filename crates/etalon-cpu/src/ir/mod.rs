@@ -68,21 +68,47 @@ pub(crate) enum Hazard {
 pub(crate) enum Node {
     Inst(Inst),
     /// `value = variable`, a snapshot.
-    Get { value: Value, variable: Variable },
+    Get {
+        value: Value,
+        variable: Variable,
+    },
     /// `variable = value`. Whether it is read again and the hazards are found
     /// by [`crate::lower`].
-    Set { variable: Variable, value: Value, span: Span, is_read: bool, hazards: Vec<Hazard> },
+    Set {
+        variable: Variable,
+        value: Value,
+        span: Span,
+        is_read: bool,
+        hazards: Vec<Hazard>,
+    },
     /// Branches are numbered by [`crate::lower`].
-    If { id: u32, condition: Value, accept: Vec<Node>, reject: Vec<Node> },
+    If {
+        id: u32,
+        condition: Value,
+        accept: Vec<Node>,
+        reject: Vec<Node>,
+    },
     /// Runs `body` once; [`Node::Exit`] leaves it.
-    Scope { id: ScopeId, body: Vec<Node> },
+    Scope {
+        id: ScopeId,
+        body: Vec<Node>,
+    },
     /// Repeats `body`, `continuing`. [`Node::Exit`] of `id` ends the loop, of
     /// `next` goes to `continuing`; `break_if` ends it after `continuing`.
-    Loop { id: ScopeId, next: ScopeId, body: Vec<Node>, continuing: Vec<Node>, break_if: Option<Value>, span: Span },
+    Loop {
+        id: ScopeId,
+        next: ScopeId,
+        body: Vec<Node>,
+        continuing: Vec<Node>,
+        break_if: Option<Value>,
+        span: Span,
+    },
     /// Goes to the end of the scope.
     Exit(ScopeId),
     /// All invocations of the workgroup must get here together.
-    Barrier { span: Span },
+    Barrier {
+        span: Span,
+    },
 }
 
 /// A whole kernel.
@@ -97,7 +123,6 @@ pub(crate) struct Tree {
     pub(crate) body: Vec<Node>,
     pub(crate) resources: Resources,
 }
-
 
 /// What the instructions refer to by index.
 #[derive(Clone, Debug, Default)]

@@ -75,30 +75,74 @@ pub(crate) enum Op {
     /// Copies the operand: what variables become.
     Move(Class),
     /// An element of a constant table.
-    Table { table: u32, class: Class },
+    Table {
+        table: u32,
+        class: Class,
+    },
     /// A word of a uniform or storage buffer; the word's index is `offset` plus
     /// the operand, if there is one. `constant` where nobody can write it.
-    BufferLoad { buffer: u16, offset: u32, class: Class, constant: bool },
+    BufferLoad {
+        buffer: u16,
+        offset: u32,
+        class: Class,
+        constant: bool,
+    },
     /// Operands: the value, then the index if there is one.
-    BufferStore { buffer: u16, offset: u32, class: Class },
+    BufferStore {
+        buffer: u16,
+        offset: u32,
+        class: Class,
+    },
     /// The number of elements of a runtime-sized array.
-    BufferLength { buffer: u16, offset: u32, stride: u32 },
+    BufferLength {
+        buffer: u16,
+        offset: u32,
+        stride: u32,
+    },
     /// Operands: value(s), then the index if there is one. Results: the old value.
-    BufferAtomic { buffer: u16, offset: u32, function: AtomicFunction },
+    BufferAtomic {
+        buffer: u16,
+        offset: u32,
+        function: AtomicFunction,
+    },
     /// A slot of memory; the slot is `slot` plus the operand, if there is one.
-    MemoryLoad { memory: Memory, slot: u32, class: Class },
+    MemoryLoad {
+        memory: Memory,
+        slot: u32,
+        class: Class,
+    },
     /// Operands: the value, then the index if there is one.
-    MemoryStore { memory: Memory, slot: u32, class: Class },
+    MemoryStore {
+        memory: Memory,
+        slot: u32,
+        class: Class,
+    },
     /// Like [`Op::BufferAtomic`] on workgroup memory.
-    WorkgroupAtomic { slot: u32, function: AtomicFunction },
+    WorkgroupAtomic {
+        slot: u32,
+        function: AtomicFunction,
+    },
     /// Operands: coordinates, layer, level (absent for storage images). Results: four channels.
-    ImageLoad { access: ImageAccess, class: Class, level: bool },
+    ImageLoad {
+        access: ImageAccess,
+        class: Class,
+        level: bool,
+    },
     /// Operands: coordinates, layer, four channels.
-    ImageStore { access: ImageAccess, class: Class },
+    ImageStore {
+        access: ImageAccess,
+        class: Class,
+    },
     /// Operands: coordinates, layer, level. Results: four channels.
-    ImageSample { access: ImageAccess, sampler: u16 },
+    ImageSample {
+        access: ImageAccess,
+        sampler: u16,
+    },
     /// Operand: the level, for sizes of mipmapped images.
-    ImageQuery { image: u16, query: ImageQuery },
+    ImageQuery {
+        image: u16,
+        query: ImageQuery,
+    },
     /// Fails unless every invocation is active.
     Barrier,
 }
@@ -110,14 +154,26 @@ impl Op {
         match self {
             Self::BufferLoad { constant, .. } => constant,
             Self::ImageLoad { level, .. } => level,
-            Self::Arith(_) | Self::Input(_) | Self::Table { .. } | Self::BufferLength { .. } | Self::ImageSample { .. } | Self::ImageQuery { .. } => true,
+            Self::Arith(_)
+            | Self::Input(_)
+            | Self::Table { .. }
+            | Self::BufferLength { .. }
+            | Self::ImageSample { .. }
+            | Self::ImageQuery { .. } => true,
             _ => false,
         }
     }
 
     /// Whether the instruction can be dropped when its results are not wanted.
     pub(crate) fn is_removable(self) -> bool {
-        self.is_pure() || matches!(self, Self::Move(_) | Self::BufferLoad { .. } | Self::MemoryLoad { .. } | Self::ImageLoad { .. })
+        self.is_pure()
+            || matches!(
+                self,
+                Self::Move(_)
+                    | Self::BufferLoad { .. }
+                    | Self::MemoryLoad { .. }
+                    | Self::ImageLoad { .. }
+            )
     }
 
     /// Whether the same operands give the same result in the whole dispatch.
@@ -131,7 +187,10 @@ impl Op {
     /// Whether results differ between lanes even when the operands do not.
     pub(crate) fn is_varying(self) -> bool {
         match self {
-            Self::Input(input) => matches!(input, Input::LocalId(_) | Input::LocalIndex | Input::ActiveLanes),
+            Self::Input(input) => matches!(
+                input,
+                Input::LocalId(_) | Input::LocalIndex | Input::ActiveLanes
+            ),
             Self::MemoryLoad { memory, .. } => memory == Memory::Private,
             Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } => true,
             _ => false,
@@ -142,7 +201,12 @@ impl Op {
     pub(crate) fn is_masked(self) -> bool {
         matches!(
             self,
-            Self::BufferStore { .. } | Self::BufferAtomic { .. } | Self::MemoryStore { .. } | Self::WorkgroupAtomic { .. } | Self::ImageStore { .. } | Self::Barrier
+            Self::BufferStore { .. }
+                | Self::BufferAtomic { .. }
+                | Self::MemoryStore { .. }
+                | Self::WorkgroupAtomic { .. }
+                | Self::ImageStore { .. }
+                | Self::Barrier
         )
     }
 
@@ -150,7 +214,10 @@ impl Op {
     pub(crate) fn speculation_cost(self) -> Option<u32> {
         match self {
             Self::Arith(arith) => Some(arith.cost()),
-            Self::Input(_) | Self::Table { .. } | Self::BufferLength { .. } | Self::ImageQuery { .. } => Some(1),
+            Self::Input(_)
+            | Self::Table { .. }
+            | Self::BufferLength { .. }
+            | Self::ImageQuery { .. } => Some(1),
             Self::BufferLoad { .. } => Some(3),
             Self::MemoryLoad { .. } => Some(3),
             _ => None,
@@ -180,16 +247,41 @@ impl fmt::Display for Op {
             },
             Self::Move(c) => write!(f, "move.{}", class(c)),
             Self::Table { table, class: c } => write!(f, "table.{} t{table}", class(c)),
-            Self::BufferLoad { buffer, offset, class: c, .. } => write!(f, "load.{} b{buffer}+{offset}", class(c)),
-            Self::BufferStore { buffer, offset, class: c } => write!(f, "store.{} b{buffer}+{offset}", class(c)),
+            Self::BufferLoad {
+                buffer,
+                offset,
+                class: c,
+                ..
+            } => write!(f, "load.{} b{buffer}+{offset}", class(c)),
+            Self::BufferStore {
+                buffer,
+                offset,
+                class: c,
+            } => write!(f, "store.{} b{buffer}+{offset}", class(c)),
             Self::BufferLength { buffer, .. } => write!(f, "length b{buffer}"),
-            Self::BufferAtomic { buffer, offset, function } => write!(f, "atomic.{function:?} b{buffer}+{offset}"),
-            Self::MemoryLoad { memory, slot, class: c } => write!(f, "load.{} {memory:?}+{slot}", class(c)),
-            Self::MemoryStore { memory, slot, class: c } => write!(f, "store.{} {memory:?}+{slot}", class(c)),
-            Self::WorkgroupAtomic { slot, function } => write!(f, "atomic.{function:?} Workgroup+{slot}"),
+            Self::BufferAtomic {
+                buffer,
+                offset,
+                function,
+            } => write!(f, "atomic.{function:?} b{buffer}+{offset}"),
+            Self::MemoryLoad {
+                memory,
+                slot,
+                class: c,
+            } => write!(f, "load.{} {memory:?}+{slot}", class(c)),
+            Self::MemoryStore {
+                memory,
+                slot,
+                class: c,
+            } => write!(f, "store.{} {memory:?}+{slot}", class(c)),
+            Self::WorkgroupAtomic { slot, function } => {
+                write!(f, "atomic.{function:?} Workgroup+{slot}")
+            }
             Self::ImageLoad { access, .. } => write!(f, "image.load b{}", access.image),
             Self::ImageStore { access, .. } => write!(f, "image.store b{}", access.image),
-            Self::ImageSample { access, sampler } => write!(f, "image.sample b{} b{sampler}", access.image),
+            Self::ImageSample { access, sampler } => {
+                write!(f, "image.sample b{} b{sampler}", access.image)
+            }
             Self::ImageQuery { image, query } => write!(f, "image.query b{image} {query:?}"),
             Self::Barrier => f.write_str("barrier"),
         }

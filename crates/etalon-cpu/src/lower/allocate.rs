@@ -19,12 +19,18 @@ pub(crate) struct Allocation {
 }
 
 pub(crate) fn allocate(flat: &Flat) -> Allocation {
-    let mut allocation = Allocation { numbers: vec![None; flat.regs.len()], ..Allocation::default() };
+    let mut allocation = Allocation {
+        numbers: vec![None; flat.regs.len()],
+        ..Allocation::default()
+    };
     uniform(flat, &mut allocation);
     let mut intervals = intervals(flat);
     intervals.sort_by_key(|interval| (interval.start, interval.reg));
     for class in [Class::Float, Class::Int] {
-        let of_class: Vec<&Interval> = intervals.iter().filter(|interval| flat.regs[interval.reg.0 as usize].class == class).collect();
+        let of_class: Vec<&Interval> = intervals
+            .iter()
+            .filter(|interval| flat.regs[interval.reg.0 as usize].class == class)
+            .collect();
         let used = scan(&of_class, &mut allocation.numbers);
         match class {
             Class::Float => allocation.varying_float = used,
@@ -35,13 +41,20 @@ pub(crate) fn allocate(flat: &Flat) -> Allocation {
 }
 
 fn mentioned(inst: &FlatInst) -> impl Iterator<Item = Reg> + '_ {
-    inst.operands.iter().chain(&inst.mask).copied().chain(inst.results.iter().flatten().copied())
+    inst.operands
+        .iter()
+        .chain(&inst.mask)
+        .copied()
+        .chain(inst.results.iter().flatten().copied())
 }
 
 /// There are few uniform registers and they are small: each gets its own.
 fn uniform(flat: &Flat, allocation: &mut Allocation) {
     let ends = flat.blocks.iter().filter_map(|block| block.end.operand());
-    let insts = flat.prologue.iter().chain(flat.blocks.iter().flat_map(|block| &block.insts));
+    let insts = flat
+        .prologue
+        .iter()
+        .chain(flat.blocks.iter().flat_map(|block| &block.insts));
     for reg in insts.flat_map(mentioned).chain(ends) {
         let info = flat.regs[reg.0 as usize];
         let number = &mut allocation.numbers[reg.0 as usize];
@@ -74,8 +87,18 @@ fn intervals(flat: &Flat) -> Vec<Interval> {
         let (mut reads, mut writes) = (BitSet::new(count), BitSet::new(count));
         for inst in &block.insts {
             // A masked move also keeps what was there.
-            let kept = inst.results.iter().flatten().filter(|_| inst.mask.is_some());
-            for reg in inst.operands.iter().chain(&inst.mask).chain(kept).filter(|reg| varying(reg)) {
+            let kept = inst
+                .results
+                .iter()
+                .flatten()
+                .filter(|_| inst.mask.is_some());
+            for reg in inst
+                .operands
+                .iter()
+                .chain(&inst.mask)
+                .chain(kept)
+                .filter(|reg| varying(reg))
+            {
                 if !writes.contains(reg.0 as usize) {
                     reads.insert(reg.0 as usize);
                 }
@@ -113,7 +136,11 @@ fn intervals(flat: &Flat) -> Vec<Interval> {
     }
     let mut found: Vec<Option<Interval>> = vec![None; count];
     let mut touch = |reg: usize, position: u32| {
-        let interval = found[reg].get_or_insert(Interval { reg: Reg(reg as u32), start: position, end: position });
+        let interval = found[reg].get_or_insert(Interval {
+            reg: Reg(reg as u32),
+            start: position,
+            end: position,
+        });
         interval.start = interval.start.min(position);
         interval.end = interval.end.max(position);
     };

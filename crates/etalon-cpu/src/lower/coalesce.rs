@@ -49,7 +49,13 @@ pub(super) fn coalesce(flat: &mut Flat) {
         }
     }
     let removed = vec![false; positions.len()];
-    let mut code = Code { flat, places, loops, positions, removed };
+    let mut code = Code {
+        flat,
+        places,
+        loops,
+        positions,
+        removed,
+    };
     for position in 0..code.positions.len() {
         code.try_copy(position);
     }
@@ -62,7 +68,14 @@ impl Code<'_> {
         let mut last = from;
         for &read in &self.places[reg.0 as usize].reads {
             // Read in a loop that the write is not in: until the loop's end.
-            let end = self.loops.iter().filter(|(start, end)| (*start..=*end).contains(&read) && !(*start..=*end).contains(&from)).map(|(_, end)| *end).max();
+            let end = self
+                .loops
+                .iter()
+                .filter(|(start, end)| {
+                    (*start..=*end).contains(&read) && !(*start..=*end).contains(&from)
+                })
+                .map(|(_, end)| *end)
+                .max();
             last = last.max(end.unwrap_or(read));
         }
         last
@@ -70,11 +83,18 @@ impl Code<'_> {
 
     fn try_copy(&mut self, position: usize) {
         let (b, i) = self.positions[position];
-        let Some(inst) = self.flat.blocks[b].insts.get(i) else { return };
-        let (Op::Move(_), None, &[Some(to)], &[from]) = (inst.op, inst.mask, &inst.results[..], &inst.operands[..]) else {
+        let Some(inst) = self.flat.blocks[b].insts.get(i) else {
             return;
         };
-        let (to_info, from_info) = (self.flat.regs[to.0 as usize], self.flat.regs[from.0 as usize]);
+        let (Op::Move(_), None, &[Some(to)], &[from]) =
+            (inst.op, inst.mask, &inst.results[..], &inst.operands[..])
+        else {
+            return;
+        };
+        let (to_info, from_info) = (
+            self.flat.regs[to.0 as usize],
+            self.flat.regs[from.0 as usize],
+        );
         if to == from {
             self.removed[position] = true;
             return;
@@ -97,14 +117,19 @@ impl Code<'_> {
             return false;
         }
         let last = self.last_read(to, position);
-        self.places[from.0 as usize].writes.iter().all(|&write| write < position || write > last || (write == last && self.reads_at(to, last)))
+        self.places[from.0 as usize].writes.iter().all(|&write| {
+            write < position || write > last || (write == last && self.reads_at(to, last))
+        })
     }
 
     /// Whether an instruction itself reads `reg` at `position`, before it writes.
     fn reads_at(&self, reg: Reg, position: usize) -> bool {
         let (b, i) = self.positions[position];
         // A masked move keeps lanes of its destination: reading and writing are not apart.
-        self.flat.blocks[b].insts.get(i).is_some_and(|inst| inst.operands.contains(&reg) && inst.mask.is_none())
+        self.flat.blocks[b]
+            .insts
+            .get(i)
+            .is_some_and(|inst| inst.operands.contains(&reg) && inst.mask.is_none())
     }
 
     /// Whether the value `from`, computed in the same block, can be computed
@@ -113,13 +138,23 @@ impl Code<'_> {
         let &[computed] = &self.places[from.0 as usize].writes[..] else {
             return false;
         };
-        let same_block = computed < position && self.positions[computed].0 == self.positions[position].0;
+        let same_block =
+            computed < position && self.positions[computed].0 == self.positions[position].0;
         let last = self.last_read(from, position);
         let variable = &self.places[to.0 as usize];
         same_block
-            && self.places[from.0 as usize].reads.iter().all(|&read| read > computed)
-            && variable.reads.iter().all(|&read| read <= computed || read > position)
-            && variable.writes.iter().all(|&write| write < computed || write == position || write > last)
+            && self.places[from.0 as usize]
+                .reads
+                .iter()
+                .all(|&read| read > computed)
+            && variable
+                .reads
+                .iter()
+                .all(|&read| read <= computed || read > position)
+            && variable
+                .writes
+                .iter()
+                .all(|&write| write < computed || write == position || write > last)
             && !variable.writes.contains(&computed)
     }
 
@@ -130,8 +165,14 @@ impl Code<'_> {
             let (b, i) = self.positions[at];
             let block = &mut self.flat.blocks[b];
             if let Some(inst) = block.insts.get_mut(i) {
-                let operands = inst.operands.iter_mut().chain(&mut inst.mask).chain(inst.results.iter_mut().flatten());
-                operands.filter(|reg| **reg == gone).for_each(|reg| *reg = kept);
+                let operands = inst
+                    .operands
+                    .iter_mut()
+                    .chain(&mut inst.mask)
+                    .chain(inst.results.iter_mut().flatten());
+                operands
+                    .filter(|reg| **reg == gone)
+                    .for_each(|reg| *reg = kept);
             } else if let Some(operand) = block.end.operand_mut()
                 && *operand == gone
             {
@@ -149,7 +190,9 @@ impl Code<'_> {
     fn finish(self) {
         let mut removed = self.removed.iter();
         for block in &mut self.flat.blocks {
-            block.insts.retain(|_| !removed.next().copied().unwrap_or(false));
+            block
+                .insts
+                .retain(|_| !removed.next().copied().unwrap_or(false));
             // The terminator's position.
             removed.next();
         }

@@ -38,20 +38,36 @@ pub(crate) struct BlockId(pub(crate) u32);
 pub(crate) enum Terminator {
     Jump(BlockId),
     /// On a uniform condition.
-    Branch { condition: Reg, yes: BlockId, no: BlockId },
+    Branch {
+        condition: Reg,
+        yes: BlockId,
+        no: BlockId,
+    },
     /// On whether any lane of a mask is set.
-    Any { mask: Reg, yes: BlockId, no: BlockId },
+    Any {
+        mask: Reg,
+        yes: BlockId,
+        no: BlockId,
+    },
     /// Into a loop: its trips are counted from zero.
-    Enter { counter: u32, head: BlockId },
+    Enter {
+        counter: u32,
+        head: BlockId,
+    },
     /// Around a loop.
-    Again { counter: u32, head: BlockId },
+    Again {
+        counter: u32,
+        head: BlockId,
+    },
     End,
 }
 
 impl Terminator {
     pub(crate) fn successors(self) -> impl Iterator<Item = BlockId> {
         let (first, second) = match self {
-            Self::Jump(block) | Self::Enter { head: block, .. } | Self::Again { head: block, .. } => (Some(block), None),
+            Self::Jump(block)
+            | Self::Enter { head: block, .. }
+            | Self::Again { head: block, .. } => (Some(block), None),
             Self::Branch { yes, no, .. } | Self::Any { yes, no, .. } => (Some(yes), Some(no)),
             Self::End => (None, None),
         };

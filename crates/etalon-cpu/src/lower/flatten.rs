@@ -11,12 +11,17 @@ use naga::Span;
 
 use super::flat::{Block, BlockId, Flat, FlatInst, Reg, RegInfo, Terminator};
 use super::uniform::Uniformity;
-use crate::ir::{Arith, Class, Hazard, Input, Inst, Node, Op, Origin, ScopeId, Tree, Value, Variable};
+use crate::ir::{
+    Arith, Class, Hazard, Input, Inst, Node, Op, Origin, ScopeId, Tree, Value, Variable,
+};
 
 pub(super) fn flatten(tree: &Tree, uniformity: &Uniformity, partial: bool) -> Flat {
     let mut flattener = Flattener {
         uniformity,
-        flat: Flat { resources: tree.resources.clone(), ..Flat::default() },
+        flat: Flat {
+            resources: tree.resources.clone(),
+            ..Flat::default()
+        },
         variables: tree.values.len() as u32,
         constants: HashMap::new(),
         open: None,
@@ -28,13 +33,29 @@ pub(super) fn flatten(tree: &Tree, uniformity: &Uniformity, partial: bool) -> Fl
         span: Span::default(),
     };
     for (i, value) in tree.values.iter().enumerate() {
-        let constant = if let Origin::Constant(bits) = value.origin { Some(bits) } else { None };
-        flattener.flat.regs.push(RegInfo { class: value.class, varying: uniformity.is_varying(Value(i as u32)), constant });
+        let constant = if let Origin::Constant(bits) = value.origin {
+            Some(bits)
+        } else {
+            None
+        };
+        flattener.flat.regs.push(RegInfo {
+            class: value.class,
+            varying: uniformity.is_varying(Value(i as u32)),
+            constant,
+        });
     }
     for (i, &class) in tree.variables.iter().enumerate() {
-        flattener.flat.regs.push(RegInfo { class, varying: uniformity.is_variable_varying(Variable(i as u32)), constant: None });
+        flattener.flat.regs.push(RegInfo {
+            class,
+            varying: uniformity.is_variable_varying(Variable(i as u32)),
+            constant: None,
+        });
     }
-    flattener.flat.prologue = tree.prologue.iter().map(|inst| flattener.inst(inst)).collect();
+    flattener.flat.prologue = tree
+        .prologue
+        .iter()
+        .map(|inst| flattener.inst(inst))
+        .collect();
     flattener.body(&tree.body, partial);
     flattener.flat
 }
@@ -96,7 +117,10 @@ impl Flattener<'_> {
             .map(|&block| {
                 let mut block = block.unwrap_or(BlockId(0));
                 // Each step goes forward, except that loops are entered by `Enter`.
-                while let Some(Block { insts, end: Terminator::Jump(next) }) = self.flat.blocks.get(block.0 as usize)
+                while let Some(Block {
+                    insts,
+                    end: Terminator::Jump(next),
+                }) = self.flat.blocks.get(block.0 as usize)
                     && insts.is_empty()
                     && let Some(Some(next)) = self.labels.get(next.0 as usize)
                     && *next > block
@@ -106,10 +130,13 @@ impl Flattener<'_> {
                 block
             })
             .collect();
-        let resolve = |label: &mut BlockId| *label = targets.get(label.0 as usize).copied().unwrap_or(*label);
+        let resolve =
+            |label: &mut BlockId| *label = targets.get(label.0 as usize).copied().unwrap_or(*label);
         for block in &mut self.flat.blocks {
             match &mut block.end {
-                Terminator::Jump(to) | Terminator::Enter { head: to, .. } | Terminator::Again { head: to, .. } => resolve(to),
+                Terminator::Jump(to)
+                | Terminator::Enter { head: to, .. }
+                | Terminator::Again { head: to, .. } => resolve(to),
                 Terminator::Branch { yes, no, .. } | Terminator::Any { yes, no, .. } => {
                     resolve(yes);
                     resolve(no);
@@ -141,7 +168,13 @@ impl Flattener<'_> {
     fn push(&mut self, op: Op, results: &[Reg], operands: &[Reg], mask: Option<Reg>) {
         let span = self.span;
         if let Some(open) = &mut self.open {
-            open.push(FlatInst { op, results: results.iter().copied().map(Some).collect(), operands: operands.to_vec(), mask, span });
+            open.push(FlatInst {
+                op,
+                results: results.iter().copied().map(Some).collect(),
+                operands: operands.to_vec(),
+                mask,
+                span,
+            });
         }
     }
 
@@ -151,14 +184,22 @@ impl Flattener<'_> {
     }
 
     fn new_mask(&mut self) -> Reg {
-        self.new_reg(RegInfo { class: Class::Int, varying: true, constant: None })
+        self.new_reg(RegInfo {
+            class: Class::Int,
+            varying: true,
+            constant: None,
+        })
     }
 
     fn constant(&mut self, bits: u32) -> Reg {
         if let Some(&reg) = self.constants.get(&bits) {
             return reg;
         }
-        let reg = self.new_reg(RegInfo { class: Class::Int, varying: false, constant: Some(bits) });
+        let reg = self.new_reg(RegInfo {
+            class: Class::Int,
+            varying: false,
+            constant: Some(bits),
+        });
         self.constants.insert(bits, reg);
         reg
     }
@@ -176,7 +217,11 @@ impl Flattener<'_> {
     fn inst(&self, inst: &Inst) -> FlatInst {
         FlatInst {
             op: inst.op,
-            results: inst.results.iter().map(|result| result.map(|value| Reg(value.0))).collect(),
+            results: inst
+                .results
+                .iter()
+                .map(|result| result.map(|value| Reg(value.0)))
+                .collect(),
             operands: inst.operands.iter().map(|value| Reg(value.0)).collect(),
             mask: if inst.op.is_masked() { self.mask } else { None },
             span: inst.span,
@@ -199,10 +244,28 @@ impl Flattener<'_> {
                     let class = self.flat.regs[result.0 as usize].class;
                     self.push(Op::Move(class), &[result], &[variable], None);
                 }
-                Node::Set { variable, value, span, hazards, .. } => self.set(*variable, *value, *span, hazards),
-                Node::If { condition, accept, reject, .. } => self.branch(*condition, accept, reject, is_last),
+                Node::Set {
+                    variable,
+                    value,
+                    span,
+                    hazards,
+                    ..
+                } => self.set(*variable, *value, *span, hazards),
+                Node::If {
+                    condition,
+                    accept,
+                    reject,
+                    ..
+                } => self.branch(*condition, accept, reject, is_last),
                 Node::Scope { id, body } => self.scope(*id, body, is_last),
-                Node::Loop { id, next, body, continuing, break_if, span } => {
+                Node::Loop {
+                    id,
+                    next,
+                    body,
+                    continuing,
+                    break_if,
+                    span,
+                } => {
                     self.repeat(*id, *next, body, continuing, *break_if, *span);
                     self.narrow(&[body, continuing], is_last);
                 }
@@ -224,17 +287,26 @@ impl Flattener<'_> {
         self.span = span;
         let (variable, value) = (self.variable(variable), Reg(value.0));
         let info = self.flat.regs[variable.0 as usize];
-        let mask = if info.varying && self.uniformity.is_hazardous(hazards) { self.mask } else { None };
+        let mask = if info.varying && self.uniformity.is_hazardous(hazards) {
+            self.mask
+        } else {
+            None
+        };
         self.push(Op::Move(info.class), &[variable], &[value], mask);
     }
 
     /// Whether something in `nodes` takes lanes out of a scope around them.
     fn escapes(&self, nodes: &[Node]) -> bool {
         nodes.iter().any(|node| match node {
-            Node::Exit(target) => self.uniformity.is_masked(*target) && self.scopes.iter().any(|scope| scope.id == *target),
+            Node::Exit(target) => {
+                self.uniformity.is_masked(*target)
+                    && self.scopes.iter().any(|scope| scope.id == *target)
+            }
             Node::If { accept, reject, .. } => self.escapes(accept) || self.escapes(reject),
             Node::Scope { body, .. } => self.escapes(body),
-            Node::Loop { body, continuing, .. } => self.escapes(body) || self.escapes(continuing),
+            Node::Loop {
+                body, continuing, ..
+            } => self.escapes(body) || self.escapes(continuing),
             _ => false,
         })
     }
@@ -258,7 +330,11 @@ impl Flattener<'_> {
         self.mask = Some(mask);
         if !is_last && let Some(&end) = self.ends.last() {
             let go_on = self.label();
-            self.close(Terminator::Any { mask, yes: to(go_on), no: to(end) });
+            self.close(Terminator::Any {
+                mask,
+                yes: to(go_on),
+                no: to(end),
+            });
             self.start(go_on);
         }
     }
@@ -269,8 +345,12 @@ impl Flattener<'_> {
         let outer = self.mask;
         if self.uniformity.is_varying(condition) {
             match (accept, reject) {
-                ([Node::Exit(target)], []) if self.uniformity.is_masked(*target) => return self.exit_if(condition_reg, true, *target, is_last, accept),
-                ([], [Node::Exit(target)]) if self.uniformity.is_masked(*target) => return self.exit_if(condition_reg, false, *target, is_last, reject),
+                ([Node::Exit(target)], []) if self.uniformity.is_masked(*target) => {
+                    return self.exit_if(condition_reg, true, *target, is_last, accept);
+                }
+                ([], [Node::Exit(target)]) if self.uniformity.is_masked(*target) => {
+                    return self.exit_if(condition_reg, false, *target, is_last, reject);
+                }
                 _ => {}
             }
             self.ends.push(join);
@@ -280,7 +360,11 @@ impl Flattener<'_> {
                     Some(mask) => self.arith(Arith::And, &[mask, condition_reg]),
                     None => condition_reg,
                 };
-                self.close(Terminator::Any { mask, yes: to(then), no: to(other) });
+                self.close(Terminator::Any {
+                    mask,
+                    yes: to(then),
+                    no: to(other),
+                });
                 self.start(then);
                 self.mask = Some(mask);
                 if let Some(end) = self.ends.last_mut() {
@@ -298,14 +382,29 @@ impl Flattener<'_> {
                     Some(mask) => self.arith(Arith::AndNot, &[mask, condition_reg]),
                     None => self.arith(Arith::Not, &[condition_reg]),
                 };
-                self.close(Terminator::Any { mask, yes: to(then), no: to(join) });
+                self.close(Terminator::Any {
+                    mask,
+                    yes: to(then),
+                    no: to(join),
+                });
                 self.start(then);
                 self.mask = Some(mask);
                 self.nodes(reject);
             }
         } else {
-            let (then, other) = (self.label(), if reject.is_empty() { join } else { self.label() });
-            self.close(Terminator::Branch { condition: condition_reg, yes: to(then), no: to(other) });
+            let (then, other) = (
+                self.label(),
+                if reject.is_empty() {
+                    join
+                } else {
+                    self.label()
+                },
+            );
+            self.close(Terminator::Branch {
+                condition: condition_reg,
+                yes: to(then),
+                no: to(other),
+            });
             self.ends.push(join);
             self.start(then);
             self.nodes(accept);
@@ -323,7 +422,14 @@ impl Flattener<'_> {
     }
 
     /// `if condition == when { exit }`.
-    fn exit_if(&mut self, condition: Reg, when: bool, target: ScopeId, is_last: bool, exit: &[Node]) {
+    fn exit_if(
+        &mut self,
+        condition: Reg,
+        when: bool,
+        target: ScopeId,
+        is_last: bool,
+        exit: &[Node],
+    ) {
         let innermost = self.scopes.iter().rev().find_map(|scope| scope.inside);
         if let Some(inside) = innermost
             && self.mask == Some(inside)
@@ -346,15 +452,27 @@ impl Flattener<'_> {
 
     /// The masks of the scopes that leaving `target` leaves, outermost first.
     fn crossed_masks(&self, target: ScopeId) -> Vec<Reg> {
-        let from = self.scopes.iter().position(|scope| scope.id == target).unwrap_or(self.scopes.len());
-        self.scopes[from..].iter().filter_map(|scope| scope.inside).collect()
+        let from = self
+            .scopes
+            .iter()
+            .position(|scope| scope.id == target)
+            .unwrap_or(self.scopes.len());
+        self.scopes[from..]
+            .iter()
+            .filter_map(|scope| scope.inside)
+            .collect()
     }
 
     /// The lanes leaving may be the innermost mask itself, so that one is
     /// changed last.
     fn take_out(&mut self, target: ScopeId, leaving: Reg) {
         for inside in self.crossed_masks(target) {
-            self.push(Op::Arith(Arith::AndNot), &[inside], &[inside, leaving], None);
+            self.push(
+                Op::Arith(Arith::AndNot),
+                &[inside],
+                &[inside, leaving],
+                None,
+            );
         }
     }
 
@@ -406,7 +524,15 @@ impl Flattener<'_> {
         self.narrow(&[body], is_last);
     }
 
-    fn repeat(&mut self, id: ScopeId, next: ScopeId, body: &[Node], continuing: &[Node], break_if: Option<Value>, span: Span) {
+    fn repeat(
+        &mut self,
+        id: ScopeId,
+        next: ScopeId,
+        body: &[Node],
+        continuing: &[Node],
+        break_if: Option<Value>,
+        span: Span,
+    ) {
         let outer = self.mask;
         let (head, step, end) = (self.label(), self.label(), self.label());
         let counter = self.flat.loops.len() as u32;
@@ -414,10 +540,17 @@ impl Flattener<'_> {
         let inside = self.enter(id);
         let in_loop = self.mask;
         self.scopes.push(Scope { id, inside, end });
-        self.close(Terminator::Enter { counter, head: to(head) });
+        self.close(Terminator::Enter {
+            counter,
+            head: to(head),
+        });
         self.start(head);
         let in_body = self.enter(next);
-        self.scopes.push(Scope { id: next, inside: in_body, end: step });
+        self.scopes.push(Scope {
+            id: next,
+            inside: in_body,
+            end: step,
+        });
         // Without lanes that wait for the next iteration, none left means the end.
         self.ends.push(if in_body.is_some() { step } else { end });
         self.nodes(body);
@@ -433,21 +566,37 @@ impl Flattener<'_> {
             let condition_reg = Reg(condition.0);
             match inside {
                 Some(inside) if self.uniformity.is_varying(condition) => {
-                    self.push(Op::Arith(Arith::AndNot), &[inside], &[inside, condition_reg], None);
+                    self.push(
+                        Op::Arith(Arith::AndNot),
+                        &[inside],
+                        &[inside, condition_reg],
+                        None,
+                    );
                 }
                 _ => {
                     let again = self.label();
-                    self.close(Terminator::Branch { condition: condition_reg, yes: to(end), no: to(again) });
+                    self.close(Terminator::Branch {
+                        condition: condition_reg,
+                        yes: to(end),
+                        no: to(again),
+                    });
                     self.start(again);
                 }
             }
         }
         if let Some(inside) = inside {
             let again = self.label();
-            self.close(Terminator::Any { mask: inside, yes: to(again), no: to(end) });
+            self.close(Terminator::Any {
+                mask: inside,
+                yes: to(again),
+                no: to(end),
+            });
             self.start(again);
         }
-        self.close(Terminator::Again { counter, head: to(head) });
+        self.close(Terminator::Again {
+            counter,
+            head: to(head),
+        });
         self.start(end);
         self.mask = outer;
     }

@@ -6,7 +6,11 @@ use crate::ir::{Arith, Op};
 
 pub(super) fn multiply_add(flat: &mut Flat) {
     let mut uses = vec![0_u32; flat.regs.len()];
-    for inst in flat.prologue.iter().chain(flat.blocks.iter().flat_map(|block| &block.insts)) {
+    for inst in flat
+        .prologue
+        .iter()
+        .chain(flat.blocks.iter().flat_map(|block| &block.insts))
+    {
         for operand in inst.operands.iter().chain(&inst.mask) {
             uses[operand.0 as usize] += 1;
         }
@@ -21,19 +25,26 @@ pub(super) fn multiply_add(flat: &mut Flat) {
         let mut dropped = vec![false; block.insts.len()];
         for i in 0..block.insts.len() {
             let inst = &block.insts[i];
-            let Some(Some(result)) = inst.results.first().copied() else { continue };
+            let Some(Some(result)) = inst.results.first().copied() else {
+                continue;
+            };
             match inst.op {
-                Op::Arith(Arith::MulF) if uses[result.0 as usize] == 1 && flat.regs[result.0 as usize].varying => product[result.0 as usize] = Some(i),
+                Op::Arith(Arith::MulF)
+                    if uses[result.0 as usize] == 1 && flat.regs[result.0 as usize].varying =>
+                {
+                    product[result.0 as usize] = Some(i)
+                }
                 Op::Arith(op @ (Arith::AddF | Arith::SubF)) => {
                     let (a, b) = (inst.operands[0], inst.operands[1]);
                     // Only products of this block are noted, see below.
-                    let (at, other, fused) = match (product[a.0 as usize], product[b.0 as usize], op) {
-                        (_, Some(at), Arith::AddF) => (at, a, Arith::MulAddF),
-                        (_, Some(at), _) => (at, a, Arith::SubMulF),
-                        (Some(at), _, Arith::AddF) => (at, b, Arith::MulAddF),
-                        (Some(at), _, _) => (at, b, Arith::MulSubF),
-                        (None, None, _) => continue,
-                    };
+                    let (at, other, fused) =
+                        match (product[a.0 as usize], product[b.0 as usize], op) {
+                            (_, Some(at), Arith::AddF) => (at, a, Arith::MulAddF),
+                            (_, Some(at), _) => (at, a, Arith::SubMulF),
+                            (Some(at), _, Arith::AddF) => (at, b, Arith::MulAddF),
+                            (Some(at), _, _) => (at, b, Arith::MulSubF),
+                            (None, None, _) => continue,
+                        };
                     let mut operands = block.insts[at].operands.clone();
                     // A uniform factor goes second.
                     if !flat.regs[operands[0].0 as usize].varying {
@@ -41,7 +52,11 @@ pub(super) fn multiply_add(flat: &mut Flat) {
                     }
                     operands.push(other);
                     let inst = &mut block.insts[i];
-                    *inst = FlatInst { op: Op::Arith(fused), operands, ..inst.clone() };
+                    *inst = FlatInst {
+                        op: Op::Arith(fused),
+                        operands,
+                        ..inst.clone()
+                    };
                     dropped[at] = true;
                 }
                 _ => {}

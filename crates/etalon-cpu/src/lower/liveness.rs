@@ -13,11 +13,15 @@ pub(super) struct BitSet {
 
 impl BitSet {
     pub(super) fn new(size: usize) -> Self {
-        Self { words: vec![0; size.div_ceil(64)] }
+        Self {
+            words: vec![0; size.div_ceil(64)],
+        }
     }
 
     pub(super) fn contains(&self, index: usize) -> bool {
-        self.words.get(index / 64).is_some_and(|word| word >> (index % 64) & 1 == 1)
+        self.words
+            .get(index / 64)
+            .is_some_and(|word| word >> (index % 64) & 1 == 1)
     }
 
     pub(super) fn insert(&mut self, index: usize) {
@@ -43,7 +47,11 @@ impl BitSet {
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
-        self.words.iter().enumerate().flat_map(|(i, &word)| (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| i * 64 + bit))
+        self.words.iter().enumerate().flat_map(|(i, &word)| {
+            (0..64)
+                .filter(move |bit| word >> bit & 1 == 1)
+                .map(move |bit| i * 64 + bit)
+        })
     }
 }
 
@@ -51,7 +59,11 @@ impl BitSet {
 pub(super) fn prune(tree: &mut Tree) {
     // Each round can make more dead; a few reach practically everything.
     for _ in 0..8 {
-        let mut walk = Walk { ends: HashMap::new(), enclosing: Vec::new(), branches: 0 };
+        let mut walk = Walk {
+            ends: HashMap::new(),
+            enclosing: Vec::new(),
+            branches: 0,
+        };
         let mut live = BitSet::new(tree.variables.len());
         walk.nodes(&mut tree.body, &mut live);
         if !remove_dead(tree) {
@@ -75,14 +87,26 @@ impl Walk {
             match node {
                 Node::Inst(_) | Node::Barrier { .. } => {}
                 Node::Get { variable, .. } => live.insert(variable.0 as usize),
-                Node::Set { variable, hazards, is_read, .. } => {
+                Node::Set {
+                    variable,
+                    hazards,
+                    is_read,
+                    ..
+                } => {
                     let index = variable.0 as usize;
                     hazards.clear();
-                    hazards.extend(self.enclosing.iter().filter(|(_, live)| live.contains(index)).map(|(hazard, _)| *hazard));
+                    hazards.extend(
+                        self.enclosing
+                            .iter()
+                            .filter(|(_, live)| live.contains(index))
+                            .map(|(hazard, _)| *hazard),
+                    );
                     *is_read = live.contains(index);
                     live.remove(index);
                 }
-                Node::If { id, accept, reject, .. } => {
+                Node::If {
+                    id, accept, reject, ..
+                } => {
                     *id = self.branches;
                     self.branches += 1;
                     let hazard = Hazard::Branch(*id);
@@ -101,10 +125,19 @@ impl Walk {
                     self.nodes(body, live);
                     self.enclosing.pop();
                 }
-                Node::Loop { id, next, body, continuing, break_if, .. } => {
+                Node::Loop {
+                    id,
+                    next,
+                    body,
+                    continuing,
+                    break_if,
+                    ..
+                } => {
                     let after = live.clone();
                     self.ends.insert(*id, after.clone());
-                    let mut head = BitSet { words: vec![0; after.words.len()] };
+                    let mut head = BitSet {
+                        words: vec![0; after.words.len()],
+                    };
                     let branches = self.branches;
                     loop {
                         self.branches = branches;
@@ -153,7 +186,9 @@ fn count(nodes: &[Node]) -> usize {
         .map(|node| match node {
             Node::If { accept, reject, .. } => 1 + count(accept) + count(reject),
             Node::Scope { body, .. } => 1 + count(body),
-            Node::Loop { body, continuing, .. } => 1 + count(body) + count(continuing),
+            Node::Loop {
+                body, continuing, ..
+            } => 1 + count(body) + count(continuing),
             _ => 1,
         })
         .sum()
@@ -189,7 +224,12 @@ fn sweep(nodes: &mut Vec<Node>, needed: &mut BitSet) {
                 }
                 *is_read
             }
-            Node::If { condition, accept, reject, .. } => {
+            Node::If {
+                condition,
+                accept,
+                reject,
+                ..
+            } => {
                 sweep(reject, needed);
                 sweep(accept, needed);
                 needed.insert(condition.0 as usize);
@@ -199,7 +239,12 @@ fn sweep(nodes: &mut Vec<Node>, needed: &mut BitSet) {
                 sweep(body, needed);
                 !body.is_empty()
             }
-            Node::Loop { body, continuing, break_if, .. } => {
+            Node::Loop {
+                body,
+                continuing,
+                break_if,
+                ..
+            } => {
                 if let Some(condition) = break_if {
                     needed.insert(condition.0 as usize);
                 }

@@ -55,7 +55,11 @@ impl Uniformity {
 
 pub(super) fn analyse(tree: &Tree) -> Uniformity {
     let mut walk = Walk {
-        found: Uniformity { varying_values: vec![false; tree.values.len()], varying_variables: vec![false; tree.variables.len()], ..Uniformity::default() },
+        found: Uniformity {
+            varying_values: vec![false; tree.values.len()],
+            varying_variables: vec![false; tree.variables.len()],
+            ..Uniformity::default()
+        },
         enclosing: Vec::new(),
         changed: true,
     };
@@ -91,7 +95,12 @@ impl Walk {
     }
 
     fn inst(&mut self, inst: &Inst) {
-        if inst.op.is_varying() || inst.operands.iter().any(|&operand| self.found.is_varying(operand)) {
+        if inst.op.is_varying()
+            || inst
+                .operands
+                .iter()
+                .any(|&operand| self.found.is_varying(operand))
+        {
             for &result in inst.results.iter().flatten() {
                 self.set_varying(result);
             }
@@ -101,7 +110,8 @@ impl Walk {
     fn inside(&mut self, entries: &[Enclosing], nodes: &[Node]) {
         self.enclosing.extend(entries);
         self.nodes(nodes);
-        self.enclosing.truncate(self.enclosing.len() - entries.len());
+        self.enclosing
+            .truncate(self.enclosing.len() - entries.len());
     }
 
     fn nodes(&mut self, nodes: &[Node]) {
@@ -113,14 +123,24 @@ impl Walk {
                         self.set_varying(*value);
                     }
                 }
-                Node::Set { variable, value, hazards, .. } => {
+                Node::Set {
+                    variable,
+                    value,
+                    hazards,
+                    ..
+                } => {
                     if self.found.is_varying(*value) || self.found.is_hazardous(hazards) {
                         let varying = &mut self.found.varying_variables[variable.0 as usize];
                         self.changed |= !*varying;
                         *varying = true;
                     }
                 }
-                Node::If { id, condition, accept, reject } => {
+                Node::If {
+                    id,
+                    condition,
+                    accept,
+                    reject,
+                } => {
                     if self.found.is_varying(*condition) {
                         self.changed |= self.found.divergent.insert(*id);
                     }
@@ -128,7 +148,14 @@ impl Walk {
                     self.inside(&[Enclosing::Branch(*id)], reject);
                 }
                 Node::Scope { id, body } => self.inside(&[Enclosing::Scope(*id)], body),
-                Node::Loop { id, next, body, continuing, break_if, .. } => {
+                Node::Loop {
+                    id,
+                    next,
+                    body,
+                    continuing,
+                    break_if,
+                    ..
+                } => {
                     self.inside(&[Enclosing::Loop(*id), Enclosing::Scope(*next)], body);
                     self.inside(&[Enclosing::Loop(*id)], continuing);
                     if break_if.is_some_and(|condition| self.found.is_varying(condition)) {

@@ -17,10 +17,15 @@ impl Buffer {
     /// # Errors
     /// [`RunError::OutOfMemory`] if there is no memory for it.
     pub fn zeroed(bytes: u64) -> Result<Self, RunError> {
-        let out_of_memory = || RunError::OutOfMemory { what: "a buffer".to_owned(), bytes };
+        let out_of_memory = || RunError::OutOfMemory {
+            what: "a buffer".to_owned(),
+            bytes,
+        };
         let count = usize::try_from(bytes.div_ceil(4)).map_err(|_| out_of_memory())?;
         let mut words = Vec::new();
-        words.try_reserve_exact(count).map_err(|_| out_of_memory())?;
+        words
+            .try_reserve_exact(count)
+            .map_err(|_| out_of_memory())?;
         words.resize_with(count, || AtomicU32::new(0));
         Ok(Self { words, bytes })
     }
@@ -82,8 +87,17 @@ impl Buffer {
     /// [`RunError::OutOfMemory`] if there is no memory for it.
     pub fn to_bytes(&self) -> Result<Vec<u8>, RunError> {
         let mut bytes = Vec::new();
-        bytes.try_reserve_exact(self.words.len() * 4).map_err(|_| RunError::OutOfMemory { what: "a buffer's contents".to_owned(), bytes: self.bytes })?;
-        bytes.extend(self.words.iter().flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()));
+        bytes
+            .try_reserve_exact(self.words.len() * 4)
+            .map_err(|_| RunError::OutOfMemory {
+                what: "a buffer's contents".to_owned(),
+                bytes: self.bytes,
+            })?;
+        bytes.extend(
+            self.words
+                .iter()
+                .flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()),
+        );
         // Not more than the words hold.
         bytes.truncate(self.bytes as usize);
         Ok(bytes)

@@ -37,7 +37,12 @@ macro_rules! words {
 
 /// Reads the channels that `wanted` asks for; the others are left alone.
 #[inline(always)]
-pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [bool; 4], out: &mut Channels<K>) {
+pub(crate) fn decode<const K: usize>(
+    format: Format,
+    words: &Words<K>,
+    wanted: [bool; 4],
+    out: &mut Channels<K>,
+) {
     let one = 1.0_f32.to_bits();
     let [low, high] = words;
     match format {
@@ -66,19 +71,54 @@ pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [
             each!(wanted[3], out[3], k, (high[k] >> 32) as u32);
         }
         Format::R16Float => {
-            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
+            each!(
+                wanted[0],
+                out[0],
+                k,
+                f16_to_f32(low[k] as u32 & 0xffff).to_bits()
+            );
             fill(wanted, out, 1, 0, one);
         }
         Format::Rg16Float => {
-            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
-            each!(wanted[1], out[1], k, f16_to_f32(low[k] as u32 >> 16).to_bits());
+            each!(
+                wanted[0],
+                out[0],
+                k,
+                f16_to_f32(low[k] as u32 & 0xffff).to_bits()
+            );
+            each!(
+                wanted[1],
+                out[1],
+                k,
+                f16_to_f32(low[k] as u32 >> 16).to_bits()
+            );
             fill(wanted, out, 2, 0, one);
         }
         Format::Rgba16Float => {
-            each!(wanted[0], out[0], k, f16_to_f32(low[k] as u32 & 0xffff).to_bits());
-            each!(wanted[1], out[1], k, f16_to_f32(low[k] as u32 >> 16).to_bits());
-            each!(wanted[2], out[2], k, f16_to_f32((low[k] >> 32) as u32 & 0xffff).to_bits());
-            each!(wanted[3], out[3], k, f16_to_f32((low[k] >> 32) as u32 >> 16).to_bits());
+            each!(
+                wanted[0],
+                out[0],
+                k,
+                f16_to_f32(low[k] as u32 & 0xffff).to_bits()
+            );
+            each!(
+                wanted[1],
+                out[1],
+                k,
+                f16_to_f32(low[k] as u32 >> 16).to_bits()
+            );
+            each!(
+                wanted[2],
+                out[2],
+                k,
+                f16_to_f32((low[k] >> 32) as u32 & 0xffff).to_bits()
+            );
+            each!(
+                wanted[3],
+                out[3],
+                k,
+                f16_to_f32((low[k] >> 32) as u32 >> 16).to_bits()
+            );
         }
         Format::R8Unorm => {
             each!(wanted[0], out[0], k, unorm8(low[k] as u32));
@@ -115,7 +155,13 @@ pub(crate) fn decode<const K: usize>(format: Format, words: &Words<K>, wanted: [
 
 /// Channels that the format has not, from `first` on: 0, 0, 1.
 #[inline(always)]
-fn fill<const K: usize>(wanted: [bool; 4], out: &mut Channels<K>, first: usize, zero: u32, one: u32) {
+fn fill<const K: usize>(
+    wanted: [bool; 4],
+    out: &mut Channels<K>,
+    first: usize,
+    zero: u32,
+    one: u32,
+) {
     for channel in first..4 {
         if wanted[channel] {
             out[channel] = [if channel == 3 { one } else { zero }; K];
@@ -134,23 +180,38 @@ pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out
     let [r, g, b, a] = channels;
     match format {
         Format::R32Float | Format::R32Uint | Format::R32Sint => words!(out[0], k, u64::from(r[k])),
-        Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint => words!(out[0], k, pair(r[k], g[k])),
+        Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint => {
+            words!(out[0], k, pair(r[k], g[k]))
+        }
         Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint => {
             words!(out[0], k, pair(r[k], g[k]));
             words!(out[1], k, pair(b[k], a[k]));
         }
         Format::R16Float => words!(out[0], k, u64::from(half(r[k]))),
         Format::Rg16Float => words!(out[0], k, u64::from(half(r[k]) | (half(g[k]) << 16))),
-        Format::Rgba16Float => words!(out[0], k, pair(half(r[k]) | (half(g[k]) << 16), half(b[k]) | (half(a[k]) << 16))),
+        Format::Rgba16Float => words!(
+            out[0],
+            k,
+            pair(
+                half(r[k]) | (half(g[k]) << 16),
+                half(b[k]) | (half(a[k]) << 16)
+            )
+        ),
         Format::R8Unorm => words!(out[0], k, u64::from(code8(r[k]))),
         Format::Rg8Unorm => words!(out[0], k, u64::from(code8(r[k]) | (code8(g[k]) << 8))),
-        Format::Rgba8Unorm => words!(out[0], k, u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))),
+        Format::Rgba8Unorm => words!(
+            out[0],
+            k,
+            u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))
+        ),
         _ => {
             for k in 0..K {
                 let bits = [r[k], g[k], b[k], a[k]];
                 let texel = match format.sample_kind() {
                     etalon_core::format::SampleKind::Uint => Texel::Uint(bits),
-                    etalon_core::format::SampleKind::Sint => Texel::Sint(bits.map(|bits| bits as i32)),
+                    etalon_core::format::SampleKind::Sint => {
+                        Texel::Sint(bits.map(|bits| bits as i32))
+                    }
                     _ => Texel::Float(bits.map(f32::from_bits)),
                 };
                 let mut bytes = [0; 16];
@@ -199,18 +260,32 @@ mod tests {
     fn decoding_is_the_codec() {
         for &format in Format::ALL {
             for seed in 0..200 {
-                let word = |i: u32| u64::from(bits(seed * 64 + i)) | u64::from(bits(seed * 64 + i + 32)) << 32;
-                let words: Words<16> = [std::array::from_fn(|k| word(k as u32)), std::array::from_fn(|k| word(k as u32 + 16))];
+                let word = |i: u32| {
+                    u64::from(bits(seed * 64 + i)) | u64::from(bits(seed * 64 + i + 32)) << 32
+                };
+                let words: Words<16> = [
+                    std::array::from_fn(|k| word(k as u32)),
+                    std::array::from_fn(|k| word(k as u32 + 16)),
+                ];
                 let mut channels = [[0; 16]; 4];
                 decode(format, &words, [true; 4], &mut channels);
                 for k in 0..16 {
-                    let bytes: Vec<u8> = words[0][k].to_le_bytes().into_iter().chain(words[1][k].to_le_bytes()).collect();
+                    let bytes: Vec<u8> = words[0][k]
+                        .to_le_bytes()
+                        .into_iter()
+                        .chain(words[1][k].to_le_bytes())
+                        .collect();
                     let expected = match format.decode(&bytes) {
                         Texel::Float(c) => c.map(f32::to_bits),
                         Texel::Sint(c) => c.map(|c| c as u32),
                         Texel::Uint(c) => c,
                     };
-                    assert_eq!(channels.map(|c| c[k]), expected, "{format} {:x}", words[0][k]);
+                    assert_eq!(
+                        channels.map(|c| c[k]),
+                        expected,
+                        "{format} {:x}",
+                        words[0][k]
+                    );
                 }
             }
         }
@@ -218,10 +293,35 @@ mod tests {
 
     #[test]
     fn encoding_is_the_codec() {
-        let special = [0.0, -0.0, 1.0, 0.5, 0.1, 2.0, -1.0, 65504.0, 65519.9, 65520.0, 1e-8, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.5 / 255.0, 1.5 / 255.0];
+        let special = [
+            0.0,
+            -0.0,
+            1.0,
+            0.5,
+            0.1,
+            2.0,
+            -1.0,
+            65504.0,
+            65519.9,
+            65520.0,
+            1e-8,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::NAN,
+            0.5 / 255.0,
+            1.5 / 255.0,
+        ];
         for &format in Format::ALL {
             for seed in 0..200 {
-                let lane = |c: u32| -> [u32; 16] { std::array::from_fn(|k| if seed == 0 { special[(k + c as usize) % 16].to_bits() } else { bits(seed * 64 + k as u32 * 4 + c) }) };
+                let lane = |c: u32| -> [u32; 16] {
+                    std::array::from_fn(|k| {
+                        if seed == 0 {
+                            special[(k + c as usize) % 16].to_bits()
+                        } else {
+                            bits(seed * 64 + k as u32 * 4 + c)
+                        }
+                    })
+                };
                 let channels: Channels<16> = [lane(0), lane(1), lane(2), lane(3)];
                 let mut words = [[0; 16]; 2];
                 encode(format, &channels, &mut words);
@@ -229,13 +329,20 @@ mod tests {
                     let texel = channels.map(|c| c[k]);
                     let texel = match format.sample_kind() {
                         etalon_core::format::SampleKind::Uint => Texel::Uint(texel),
-                        etalon_core::format::SampleKind::Sint => Texel::Sint(texel.map(|c| c as i32)),
+                        etalon_core::format::SampleKind::Sint => {
+                            Texel::Sint(texel.map(|c| c as i32))
+                        }
                         _ => Texel::Float(texel.map(f32::from_bits)),
                     };
                     let size = format.texel_bytes() as usize;
                     let mut expected = vec![0; size];
                     format.encode(texel, &mut expected);
-                    let bytes: Vec<u8> = words[0][k].to_le_bytes().into_iter().chain(words[1][k].to_le_bytes()).take(size).collect();
+                    let bytes: Vec<u8> = words[0][k]
+                        .to_le_bytes()
+                        .into_iter()
+                        .chain(words[1][k].to_le_bytes())
+                        .take(size)
+                        .collect();
                     assert_eq!(bytes, expected, "{format} {texel:?}");
                 }
             }
@@ -245,7 +352,12 @@ mod tests {
     #[test]
     fn unwanted_channels_are_left_alone() {
         let mut channels = [[7; 4]; 4];
-        decode(Format::Rgba32Uint, &[[u64::MAX; 4]; 2], [false, true, false, false], &mut channels);
+        decode(
+            Format::Rgba32Uint,
+            &[[u64::MAX; 4]; 2],
+            [false, true, false, false],
+            &mut channels,
+        );
         assert_eq!(channels, [[7; 4], [u32::MAX; 4], [7; 4], [7; 4]]);
     }
 }

@@ -52,7 +52,12 @@ macro_rules! each {
 
 fn reserve<T>(count: usize, bytes: u64, make: impl FnMut() -> T) -> Result<Vec<T>, RunError> {
     let mut words = Vec::new();
-    words.try_reserve_exact(count).map_err(|_| RunError::OutOfMemory { what: "a texture".to_owned(), bytes })?;
+    words
+        .try_reserve_exact(count)
+        .map_err(|_| RunError::OutOfMemory {
+            what: "a texture".to_owned(),
+            bytes,
+        })?;
     words.resize_with(count, make);
     Ok(words)
 }
@@ -65,7 +70,10 @@ impl Texture {
     /// than 2^32 - 1 texels.
     pub fn zeroed(desc: TextureDesc) -> Result<Self, RunError> {
         let bytes = desc.bytes().unwrap_or(u64::MAX);
-        let out_of_memory = || RunError::OutOfMemory { what: "a texture".to_owned(), bytes };
+        let out_of_memory = || RunError::OutOfMemory {
+            what: "a texture".to_owned(),
+            bytes,
+        };
         let texel = desc.format.texel_bytes();
         let count = bytes / u64::from(texel);
         if count >= u64::from(u32::MAX) {
@@ -76,18 +84,36 @@ impl Texture {
         let mut start = 0_u32;
         for mip in 0..desc.mips {
             let extent = desc.mip_extent(mip);
-            levels.push(Level { width: extent.width, height: extent.height, depth: extent.depth_or_layers, start });
+            levels.push(Level {
+                width: extent.width,
+                height: extent.height,
+                depth: extent.depth_or_layers,
+                start,
+            });
             // The sum is at most `count`.
-            start = start.wrapping_add(extent.width.wrapping_mul(extent.height).wrapping_mul(extent.depth_or_layers));
+            start = start.wrapping_add(
+                extent
+                    .width
+                    .wrapping_mul(extent.height)
+                    .wrapping_mul(extent.depth_or_layers),
+            );
         }
         let texels = match texel {
             1 => Texels::B1(reserve(count, bytes, || AtomicU8::new(0))?),
             2 => Texels::B2(reserve(count, bytes, || AtomicU16::new(0))?),
             4 => Texels::B4(reserve(count, bytes, || AtomicU32::new(0))?),
             8 => Texels::B8(reserve(count, bytes, || AtomicU64::new(0))?),
-            _ => Texels::B16(reserve(count.checked_mul(2).ok_or_else(out_of_memory)?, bytes, || AtomicU64::new(0))?),
+            _ => Texels::B16(reserve(
+                count.checked_mul(2).ok_or_else(out_of_memory)?,
+                bytes,
+                || AtomicU64::new(0),
+            )?),
         };
-        Ok(Self { desc, levels, texels })
+        Ok(Self {
+            desc,
+            levels,
+            texels,
+        })
     }
 
     /// A texture with an image's texels.
@@ -115,7 +141,11 @@ impl Texture {
     /// All mips and layers.
     #[must_use]
     pub fn view(&self) -> TextureView<'_> {
-        TextureView { desc: self.desc, levels: self.levels.clone(), texels: &self.texels }
+        TextureView {
+            desc: self.desc,
+            levels: self.levels.clone(),
+            texels: &self.texels,
+        }
     }
 
     /// Some mips and layers as a texture of their own; `None` if there are no
@@ -127,12 +157,18 @@ impl Texture {
         let levels = levels
             .map(|level| match self.desc.dimension {
                 Dimension::D3 => *level,
-                Dimension::D2 | Dimension::Cube => {
-                    Level { depth: range.layers, start: level.start + range.layer * level.width * level.height, ..*level }
-                }
+                Dimension::D2 | Dimension::Cube => Level {
+                    depth: range.layers,
+                    start: level.start + range.layer * level.width * level.height,
+                    ..*level
+                },
             })
             .collect();
-        Some(TextureView { desc, levels, texels: &self.texels })
+        Some(TextureView {
+            desc,
+            levels,
+            texels: &self.texels,
+        })
     }
 
     /// Overwrites the texels; bytes beyond the end are ignored.
@@ -156,17 +192,29 @@ impl Texture {
 /// The shape that a part of a texture has as a texture of its own: some of a
 /// cube's faces are layers.
 fn part_desc(desc: &TextureDesc, range: Subresources) -> Option<TextureDesc> {
-    let within = |first: u32, count: u32, all: u32| count > 0 && first.checked_add(count).is_some_and(|end| end <= all);
-    if !within(range.mip, range.mips, desc.mips) || !within(range.layer, range.layers, desc.layers()) {
+    let within = |first: u32, count: u32, all: u32| {
+        count > 0 && first.checked_add(count).is_some_and(|end| end <= all)
+    };
+    if !within(range.mip, range.mips, desc.mips)
+        || !within(range.layer, range.layers, desc.layers())
+    {
         return None;
     }
     let size = desc.mip_extent(range.mip);
     let (dimension, depth_or_layers) = match desc.dimension {
         Dimension::D3 => (Dimension::D3, size.depth_or_layers),
-        Dimension::Cube if range.layers % 6 == 0 => (Dimension::Cube, range.layers),
+        Dimension::Cube if range.layers.is_multiple_of(6) => (Dimension::Cube, range.layers),
         Dimension::D2 | Dimension::Cube => (Dimension::D2, range.layers),
     };
-    Some(TextureDesc { dimension, extent: Extent { depth_or_layers, ..size }, mips: range.mips, format: desc.format })
+    Some(TextureDesc {
+        dimension,
+        extent: Extent {
+            depth_or_layers,
+            ..size
+        },
+        mips: range.mips,
+        format: desc.format,
+    })
 }
 
 /// Some mips and layers of a texture.
@@ -186,10 +234,16 @@ impl TextureView<'_> {
 
     /// The words of each mip, which are consecutive: first and one past the last.
     fn runs(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
-        let words = if matches!(self.texels, Texels::B16(_)) { 2 } else { 1 };
+        let words = if matches!(self.texels, Texels::B16(_)) {
+            2
+        } else {
+            1
+        };
         self.levels.iter().map(move |level| {
             let start = level.start as usize * words;
-            start..start + level.width as usize * level.height as usize * level.depth as usize * words
+            start
+                ..start
+                    + level.width as usize * level.height as usize * level.depth as usize * words
         })
     }
 
@@ -201,13 +255,21 @@ impl TextureView<'_> {
         let total = self.desc.bytes().unwrap_or(u64::MAX);
         let mut bytes = Vec::new();
         let capacity = usize::try_from(total).unwrap_or(usize::MAX);
-        bytes.try_reserve_exact(capacity).map_err(|_| RunError::OutOfMemory { what: "a copy of a texture".to_owned(), bytes: total })?;
+        bytes
+            .try_reserve_exact(capacity)
+            .map_err(|_| RunError::OutOfMemory {
+                what: "a copy of a texture".to_owned(),
+                bytes: total,
+            })?;
         for run in self.runs() {
             each!(self.texels, words => for word in &words[run] {
                 bytes.extend_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
             });
         }
-        Ok(ImageData { desc: self.desc, bytes })
+        Ok(ImageData {
+            desc: self.desc,
+            bytes,
+        })
     }
 
     /// Fills all texels with one.
@@ -229,11 +291,23 @@ impl TextureView<'_> {
         }
         for (to, from) in self.runs().zip(source.runs()) {
             match (self.texels, source.texels) {
-                (Texels::B1(a), Texels::B1(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
-                (Texels::B2(a), Texels::B2(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
-                (Texels::B4(a), Texels::B4(b)) => a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B1(a), Texels::B1(b)) => a[to]
+                    .iter()
+                    .zip(&b[from])
+                    .for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B2(a), Texels::B2(b)) => a[to]
+                    .iter()
+                    .zip(&b[from])
+                    .for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
+                (Texels::B4(a), Texels::B4(b)) => a[to]
+                    .iter()
+                    .zip(&b[from])
+                    .for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed)),
                 (Texels::B8(a) | Texels::B16(a), Texels::B8(b) | Texels::B16(b)) => {
-                    a[to].iter().zip(&b[from]).for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed));
+                    a[to]
+                        .iter()
+                        .zip(&b[from])
+                        .for_each(|(a, b)| a.store(b.load(Ordering::Relaxed), Ordering::Relaxed));
                 }
                 // One format has one texel size.
                 _ => return false,

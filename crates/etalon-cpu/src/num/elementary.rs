@@ -40,7 +40,7 @@ fn exp2_clamped(x: f64) -> f32 {
     let x = if x > 200.0 { 200.0 } else { x };
     let x = if x < -200.0 { -200.0 } else { x };
     let result = exp2_f64(x) as f32;
-    if x != x { f32::NAN } else { result }
+    if x.is_nan() { f32::NAN } else { result }
 }
 
 #[inline(always)]
@@ -76,16 +76,21 @@ fn log2_f64(x: f64) -> f64 {
     // The exponent as f64 by the 2^52 trick: there is no vector conversion
     // from 64-bit integers below AVX-512.
     const OFFSET: f64 = 4_503_599_627_370_496.0 + 2048.0;
-    let exponent = f64::from_bits((exponent.wrapping_add(2048) as u64) | 0x4330_0000_0000_0000) - OFFSET;
+    let exponent =
+        f64::from_bits((exponent.wrapping_add(2048) as u64) | 0x4330_0000_0000_0000) - OFFSET;
     exponent + sum * s * (2.0 * LOG2_E)
 }
 
 /// `result` where `x` is positive and finite; the limits elsewhere.
 #[inline(always)]
 fn log_limits(x: f32, result: f32) -> f32 {
-    let result = if x == f32::INFINITY { f32::INFINITY } else { result };
+    let result = if x == f32::INFINITY {
+        f32::INFINITY
+    } else {
+        result
+    };
     let result = if x == 0.0 { f32::NEG_INFINITY } else { result };
-    let negative_or_nan = !(x >= 0.0);
+    let negative_or_nan = (x < 0.0) | x.is_nan();
     if negative_or_nan { f32::NAN } else { result }
 }
 
@@ -109,9 +114,13 @@ pub(crate) fn pow(x: f32, y: f32) -> f32 {
     let at_zero = if y > 0.0 { 0.0 } else { f32::INFINITY };
     let at_infinity = if y > 0.0 { f32::INFINITY } else { 0.0 };
     let result = if x == 0.0 { at_zero } else { result };
-    let result = if x == f32::INFINITY { at_infinity } else { result };
+    let result = if x == f32::INFINITY {
+        at_infinity
+    } else {
+        result
+    };
     let result = if y == 0.0 { 1.0 } else { result };
-    let invalid = !(x >= 0.0) | (y != y);
+    let invalid = (x < 0.0) | x.is_nan() | y.is_nan();
     if invalid { f32::NAN } else { result }
 }
 
@@ -180,12 +189,20 @@ pub(crate) fn cos_small(x: f32) -> f32 {
 
 #[inline(always)]
 pub(crate) fn sin(x: f32) -> f32 {
-    if is_small_angle(x) { sin_small(x) } else { f64::from(x).sin() as f32 }
+    if is_small_angle(x) {
+        sin_small(x)
+    } else {
+        f64::from(x).sin() as f32
+    }
 }
 
 #[inline(always)]
 pub(crate) fn cos(x: f32) -> f32 {
-    if is_small_angle(x) { cos_small(x) } else { f64::from(x).cos() as f32 }
+    if is_small_angle(x) {
+        cos_small(x)
+    } else {
+        f64::from(x).cos() as f32
+    }
 }
 
 #[inline(always)]
@@ -203,7 +220,12 @@ mod tests {
     use super::*;
 
     /// Equal up to the last bit's neighbours, for every class of input.
-    fn check(name: &str, inputs: impl Iterator<Item = f32>, ours: fn(f32) -> f32, reference: fn(f64) -> f64) {
+    fn check(
+        name: &str,
+        inputs: impl Iterator<Item = f32>,
+        ours: fn(f32) -> f32,
+        reference: fn(f64) -> f64,
+    ) {
         let mut inexact = 0_u32;
         for x in inputs {
             let (got, want) = (ours(x), reference(f64::from(x)) as f32);
@@ -215,16 +237,36 @@ mod tests {
             // same f32 except next to a rounding boundary.
             if got.to_bits() != want.to_bits() {
                 inexact += 1;
-                assert!(got == want.next_up() || got == want.next_down(), "{name}({x}) = {got}, not {want}");
+                assert!(
+                    got == want.next_up() || got == want.next_down(),
+                    "{name}({x}) = {got}, not {want}"
+                );
             }
         }
-        assert!(inexact <= 2, "{name}: {inexact} results are not the rounded reference");
+        assert!(
+            inexact <= 2,
+            "{name}: {inexact} results are not the rounded reference"
+        );
     }
 
     /// All exponents and signs, with a varied mantissa.
     fn everything() -> impl Iterator<Item = f32> {
-        let special = [0.0, -0.0, 1.0, -1.0, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, f32::MIN_POSITIVE, f32::from_bits(1), f32::MAX, f32::MIN];
-        special.into_iter().chain((0..400_000_u32).map(|i| f32::from_bits(i.wrapping_mul(0x9e37_79b1))))
+        let special = [
+            0.0,
+            -0.0,
+            1.0,
+            -1.0,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::NAN,
+            f32::MIN_POSITIVE,
+            f32::from_bits(1),
+            f32::MAX,
+            f32::MIN,
+        ];
+        special
+            .into_iter()
+            .chain((0..400_000_u32).map(|i| f32::from_bits(i.wrapping_mul(0x9e37_79b1))))
     }
 
     fn around(limit: f32) -> impl Iterator<Item = f32> {
@@ -245,8 +287,18 @@ mod tests {
 
     #[test]
     fn circular_functions_are_the_rounded_f64_ones() {
-        check("sin", everything().chain(around(10.0)).chain(around(1.0e6)), sin, f64::sin);
-        check("cos", everything().chain(around(10.0)).chain(around(1.0e6)), cos, f64::cos);
+        check(
+            "sin",
+            everything().chain(around(10.0)).chain(around(1.0e6)),
+            sin,
+            f64::sin,
+        );
+        check(
+            "cos",
+            everything().chain(around(10.0)).chain(around(1.0e6)),
+            cos,
+            f64::cos,
+        );
     }
 
     #[test]
@@ -254,7 +306,10 @@ mod tests {
         for y in [0.0, 0.5, 1.0, 2.2, 1.0 / 2.4, -1.5, 7.0, 100.0] {
             for x in everything().filter(|x| *x > 0.0 && x.is_finite()) {
                 let (got, want) = (pow(x, y), f64::from(x).powf(f64::from(y)) as f32);
-                assert!(got == want || got == want.next_up() || got == want.next_down(), "{x}^{y}: {got}, not {want}");
+                assert!(
+                    got == want || got == want.next_up() || got == want.next_down(),
+                    "{x}^{y}: {got}, not {want}"
+                );
             }
         }
         assert_eq!(pow(0.0, 2.0), 0.0);

@@ -29,7 +29,9 @@ pub(crate) fn f32_to_f16(value: f32) -> u32 {
     let normal = magnitude.wrapping_sub(112 << 23).wrapping_add(0xfff + odd) >> 13;
     // Subnormal result: adding 0.5 aligns the mantissa so that the unit of the
     // sum is 2^-24, the unit of subnormal binary16; the addition rounds to even.
-    let subnormal = (f32::from_bits(magnitude) + 0.5).to_bits().wrapping_sub(0x3f00_0000);
+    let subnormal = (f32::from_bits(magnitude) + 0.5)
+        .to_bits()
+        .wrapping_sub(0x3f00_0000);
     let is_subnormal = super::mask(magnitude < (113 << 23));
     // From 65520 on, half way between the largest finite value and 2^16.
     let is_infinite = super::mask(magnitude >= 0x477f_f000);
@@ -65,7 +67,11 @@ mod tests {
         // Every pair of neighbours, at the midpoint and one unit to each side.
         for bits in 0..0x7c00_u16 {
             let low = half::f16::from_bits(bits).to_f64();
-            let high = if bits == 0x7bff { 65536.0 } else { half::f16::from_bits(bits + 1).to_f64() };
+            let high = if bits == 0x7bff {
+                65536.0
+            } else {
+                half::f16::from_bits(bits + 1).to_f64()
+            };
             let middle = ((low + high) / 2.0) as f32;
             for value in [middle, middle.next_up(), middle.next_down(), -middle] {
                 let expected = half::f16::from_f32(value).to_bits();

@@ -103,11 +103,11 @@ impl Number for f32 {
     }
     #[inline(always)]
     fn min(self, other: Self) -> Self {
-        Number::select(mask((self < other) | (other != other)), self, other)
+        Number::select(mask((self < other) | other.is_nan()), self, other)
     }
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        Number::select(mask((self > other) | (other != other)), self, other)
+        Number::select(mask((self > other) | other.is_nan()), self, other)
     }
     #[inline(always)]
     fn pow(self, other: Self) -> Self {
@@ -240,11 +240,14 @@ impl Number for f32 {
 
     #[inline(always)]
     fn to_i32(self) -> i32 {
-        self as i32
+        let negative = mask(self < 0.0);
+        let magnitude = truncated_magnitude(self).min(0x7fff_ffff + (negative & 1));
+        let value = (magnitude ^ negative).wrapping_sub(negative);
+        (value & !mask(self.is_nan())) as i32
     }
     #[inline(always)]
     fn to_u32(self) -> u32 {
-        self as u32
+        truncated_magnitude(self) & mask(self > 0.0)
     }
     #[inline(always)]
     fn from_i32(value: i32) -> Self {
@@ -259,6 +262,22 @@ impl Number for f32 {
     fn select(mask: u32, yes: Self, no: Self) -> Self {
         f32::from_bits((yes.to_bits() & mask) | (no.to_bits() & !mask))
     }
+}
+
+/// The integer part of `|x|`, at most `u32::MAX`; anything for NaN.
+///
+/// What `as` does, but as vector code: compilers leave saturating conversions
+/// scalar.
+#[inline(always)]
+fn truncated_magnitude(x: f32) -> u32 {
+    const LARGEST: f64 = u32::MAX as f64;
+    // From here on the unit of f64 is 1: adding rounds to the nearest integer.
+    const UNIT: f64 = 4_503_599_627_370_496.0;
+    let x = f64::from(Number::abs(x));
+    let x = if x < LARGEST { x } else { LARGEST };
+    let nearest = (x + UNIT) - UNIT;
+    let below = nearest - if nearest > x { 1.0 } else { 0.0 };
+    (below + UNIT).to_bits() as u32
 }
 
 /// All ones for true: how booleans are kept in integer registers.

@@ -82,7 +82,11 @@ impl Builder {
 
     pub(super) fn check_size(&self) -> Result<(), Fail> {
         if self.node_count > MAX_NODES {
-            return Err(Fail::TooLarge { what: "number of instructions after inlining", size: self.node_count, limit: MAX_NODES });
+            return Err(Fail::TooLarge {
+                what: "number of instructions after inlining",
+                size: self.node_count,
+                limit: MAX_NODES,
+            });
         }
         Ok(())
     }
@@ -169,7 +173,9 @@ impl Builder {
                 (_, Some(0)) => Some(operands[0]),
                 _ => None,
             },
-            Arith::SubI | Arith::Shl | Arith::ShrS | Arith::ShrU => (bits(1) == Some(0)).then_some(operands[0]),
+            Arith::SubI | Arith::Shl | Arith::ShrS | Arith::ShrU => {
+                (bits(1) == Some(0)).then_some(operands[0])
+            }
             Arith::MulI => match (bits(0), bits(1)) {
                 (Some(1), _) => Some(operands[1]),
                 (_, Some(1)) => Some(operands[0]),
@@ -213,15 +219,34 @@ impl Builder {
         let span = self.span;
         let key = (op, operands);
         if op.is_pure() {
-            let known = self.levels.iter().rev().map(|level| &level.numbering).chain([&self.prologue_numbering]).find_map(|n| n.get(&key));
+            let known = self
+                .levels
+                .iter()
+                .rev()
+                .map(|level| &level.numbering)
+                .chain([&self.prologue_numbering])
+                .find_map(|n| n.get(&key));
             if let Some(known) = known {
                 return known.clone();
             }
         }
-        let in_prologue = op.is_dispatch_constant() && key.1.iter().all(|&v| self.origin(v) != Origin::Body);
-        let origin = if in_prologue { Origin::Prologue } else { Origin::Body };
-        let values: Vec<Value> = results.iter().map(|&class| self.new_value(class, origin)).collect();
-        let inst = Inst { op, results: values.iter().copied().map(Some).collect(), operands: key.1.clone(), span };
+        let in_prologue =
+            op.is_dispatch_constant() && key.1.iter().all(|&v| self.origin(v) != Origin::Body);
+        let origin = if in_prologue {
+            Origin::Prologue
+        } else {
+            Origin::Body
+        };
+        let values: Vec<Value> = results
+            .iter()
+            .map(|&class| self.new_value(class, origin))
+            .collect();
+        let inst = Inst {
+            op,
+            results: values.iter().copied().map(Some).collect(),
+            operands: key.1.clone(),
+            span,
+        };
         if in_prologue {
             self.node_count += 1;
             self.tree.prologue.push(inst);
@@ -246,7 +271,13 @@ impl Builder {
             return;
         }
         let span = self.span;
-        self.push(Node::Set { variable, value, span, is_read: true, hazards: Vec::new() });
+        self.push(Node::Set {
+            variable,
+            value,
+            span,
+            is_read: true,
+            hazards: Vec::new(),
+        });
         self.known[variable.0 as usize] = Some(value);
         self.level().assigned.insert(variable);
     }
@@ -287,14 +318,24 @@ impl Builder {
     /// Starts building nodes apart from the current ones.
     pub(super) fn begin(&mut self) {
         let before = self.known.clone();
-        self.levels.push(Level { before, ..Level::default() });
+        self.levels.push(Level {
+            before,
+            ..Level::default()
+        });
     }
 
     /// Ends what [`Builder::begin`] started. What is known of the variables
     /// stays as it is at the end.
     pub(super) fn end(&mut self, falls_through: bool) -> Branch {
         let level = self.levels.pop().unwrap_or_default();
-        Branch { nodes: level.nodes, numbering: level.numbering, assigned: level.assigned, before: level.before, known: self.known.clone(), falls_through }
+        Branch {
+            nodes: level.nodes,
+            numbering: level.numbering,
+            assigned: level.assigned,
+            before: level.before,
+            known: self.known.clone(),
+            falls_through,
+        }
     }
 
     /// What is known of the variables, for [`Builder::restore`].
@@ -314,12 +355,21 @@ impl Builder {
 
     /// Appends a two-way branch on `condition`, `before` being the snapshot at
     /// its start. Says whether its end can be reached.
-    pub(super) fn finish_if(&mut self, condition: Value, before: &[Option<Value>], accept: Branch, reject: Branch) -> bool {
+    pub(super) fn finish_if(
+        &mut self,
+        condition: Value,
+        before: &[Option<Value>],
+        accept: Branch,
+        reject: Branch,
+    ) -> bool {
         self.restore(before);
         if accept.nodes.is_empty() && reject.nodes.is_empty() {
             return accept.falls_through || reject.falls_through;
         }
-        if speculation_cost(&accept.nodes).zip(speculation_cost(&reject.nodes)).is_some_and(|(a, b)| a + b <= SPECULATION_LIMIT) {
+        if speculation_cost(&accept.nodes)
+            .zip(speculation_cost(&reject.nodes))
+            .is_some_and(|(a, b)| a + b <= SPECULATION_LIMIT)
+        {
             self.speculate(condition, before.len(), &accept, &reject);
             return true;
         }
@@ -331,7 +381,12 @@ impl Builder {
                 self.forget(branch.assigned.iter().copied());
             }
         }
-        self.push(Node::If { id: 0, condition, accept: accept.nodes, reject: reject.nodes });
+        self.push(Node::If {
+            id: 0,
+            condition,
+            accept: accept.nodes,
+            reject: reject.nodes,
+        });
         falls_through
     }
 
@@ -344,7 +399,12 @@ impl Builder {
                 self.level().nodes.push(node.clone());
             }
         }
-        let variables: BTreeSet<Variable> = accept.assigned.union(&reject.assigned).copied().filter(|v| (v.0 as usize) < outer).collect();
+        let variables: BTreeSet<Variable> = accept
+            .assigned
+            .union(&reject.assigned)
+            .copied()
+            .filter(|v| (v.0 as usize) < outer)
+            .collect();
         let mut selected = Vec::with_capacity(variables.len());
         for variable in variables {
             let mut at_end = |branch: &Branch| {
@@ -353,7 +413,8 @@ impl Builder {
                 {
                     value
                 } else {
-                    self.known[variable.0 as usize] = before.get(variable.0 as usize).copied().flatten();
+                    self.known[variable.0 as usize] =
+                        before.get(variable.0 as usize).copied().flatten();
                     self.get(variable)
                 }
             };
@@ -373,7 +434,10 @@ impl Builder {
             // Some lanes may have skipped any part of it.
             self.restore(&branch.before);
             self.forget(branch.assigned.iter().copied());
-            self.push(Node::Scope { id, body: branch.nodes });
+            self.push(Node::Scope {
+                id,
+                body: branch.nodes,
+            });
         } else {
             let level = self.level();
             level.nodes.extend(branch.nodes);
@@ -393,18 +457,36 @@ impl Builder {
             self.restore(&body.before);
             self.forget(body.assigned.iter().copied());
         } else {
-            self.level().numbering.extend(body.numbering.iter().map(|(key, values)| (key.clone(), values.clone())));
+            self.level().numbering.extend(
+                body.numbering
+                    .iter()
+                    .map(|(key, values)| (key.clone(), values.clone())),
+            );
         }
     }
 
     /// Appends a loop.
-    pub(super) fn finish_loop(&mut self, id: ScopeId, next: ScopeId, body: Branch, continuing: Branch, break_if: Option<Value>) {
+    pub(super) fn finish_loop(
+        &mut self,
+        id: ScopeId,
+        next: ScopeId,
+        body: Branch,
+        continuing: Branch,
+        break_if: Option<Value>,
+    ) {
         self.note_assigned(&body.assigned);
         self.note_assigned(&continuing.assigned);
         self.restore(&body.before);
         self.forget(body.assigned.iter().chain(&continuing.assigned).copied());
         let span = self.span;
-        self.push(Node::Loop { id, next, body: body.nodes, continuing: continuing.nodes, break_if, span });
+        self.push(Node::Loop {
+            id,
+            next,
+            body: body.nodes,
+            continuing: continuing.nodes,
+            break_if,
+            span,
+        });
     }
 }
 

@@ -1,6 +1,9 @@
 //! Expressions.
 
-use naga::{BinaryOperator, Expression, Handle, Literal, RelationalFunction, ScalarKind, TypeInner, UnaryOperator};
+use naga::{
+    BinaryOperator, Expression, Handle, Literal, RelationalFunction, ScalarKind, TypeInner,
+    UnaryOperator,
+};
 
 use super::layout::{class_of, describe};
 use super::{Fail, Frame, Operand, Place, Translator};
@@ -8,7 +11,11 @@ use crate::ir::{Arith, Class, Op, Value};
 
 impl<'a> Translator<'a> {
     /// Evaluates an expression where naga says that it is evaluated.
-    pub(super) fn emit(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<(), Fail> {
+    pub(super) fn emit(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<(), Fail> {
         let span = frame.function.expressions.get_span(expression);
         let outer = std::mem::replace(&mut self.builder.span, span);
         let operand = self.evaluate(frame, expression)?;
@@ -18,7 +25,11 @@ impl<'a> Translator<'a> {
     }
 
     /// The meaning of an expression that has been evaluated, or needs no evaluation.
-    pub(super) fn operand(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<Operand, Fail> {
+    pub(super) fn operand(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<Operand, Fail> {
         if let Some(operand) = frame.operands.get(&expression) {
             return Ok(operand.clone());
         }
@@ -28,7 +39,11 @@ impl<'a> Translator<'a> {
     }
 
     /// The scalars of a value.
-    pub(super) fn scalars(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<Vec<Value>, Fail> {
+    pub(super) fn scalars(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<Vec<Value>, Fail> {
         match self.operand(frame, expression)? {
             Operand::Scalars(values) => Ok(values),
             Operand::Place(_) => Err(Fail::invalid("a pointer is used as a value")),
@@ -36,7 +51,11 @@ impl<'a> Translator<'a> {
         }
     }
 
-    pub(super) fn scalar(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<Value, Fail> {
+    pub(super) fn scalar(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<Value, Fail> {
         let values = self.scalars(frame, expression)?;
         match values[..] {
             [value] => Ok(value),
@@ -44,34 +63,61 @@ impl<'a> Translator<'a> {
         }
     }
 
-    pub(super) fn place(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<Place, Fail> {
+    pub(super) fn place(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<Place, Fail> {
         match self.operand(frame, expression)? {
             Operand::Place(place) => Ok(place),
-            Operand::Scalars(_) | Operand::Resource(_) => Err(Fail::invalid("a value is used as a pointer")),
+            Operand::Scalars(_) | Operand::Resource(_) => {
+                Err(Fail::invalid("a value is used as a pointer"))
+            }
         }
     }
 
-    pub(super) fn resource(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<u16, Fail> {
+    pub(super) fn resource(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<u16, Fail> {
         match self.operand(frame, expression)? {
             Operand::Resource(index) => Ok(index),
-            Operand::Scalars(_) | Operand::Place(_) => Err(Fail::invalid("a value is used as a texture or sampler")),
+            Operand::Scalars(_) | Operand::Place(_) => {
+                Err(Fail::invalid("a value is used as a texture or sampler"))
+            }
         }
     }
 
-    pub(super) fn ty<'s>(&'s self, frame: &'s Frame<'a>, expression: Handle<Expression>) -> &'s TypeInner {
+    pub(super) fn ty<'s>(
+        &'s self,
+        frame: &'s Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> &'s TypeInner {
         frame.info[expression].ty.inner_with(&self.module.types)
     }
 
     /// The scalar kind of a numeric expression.
-    pub(super) fn kind(&self, frame: &Frame<'a>, expression: Handle<Expression>) -> Result<ScalarKind, Fail> {
+    pub(super) fn kind(
+        &self,
+        frame: &Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<ScalarKind, Fail> {
         let ty = self.ty(frame, expression);
-        ty.scalar_kind().ok_or_else(|| Fail::invalid(format!("a {} where numbers are expected", describe(ty))))
+        ty.scalar_kind()
+            .ok_or_else(|| Fail::invalid(format!("a {} where numbers are expected", describe(ty))))
     }
 
-    fn evaluate(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>) -> Result<Operand, Fail> {
+    fn evaluate(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+    ) -> Result<Operand, Fail> {
         let values = match frame.function.expressions[expression] {
             Expression::Literal(literal) => vec![self.literal(literal)?],
-            Expression::Constant(constant) => self.global_constant(self.module.constants[constant].init)?,
+            Expression::Constant(constant) => {
+                self.global_constant(self.module.constants[constant].init)?
+            }
             Expression::ZeroValue(ty) => self.zero(self.inner(ty))?,
             Expression::Compose { ref components, .. } => {
                 let mut values = Vec::new();
@@ -81,11 +127,20 @@ impl<'a> Translator<'a> {
                 values
             }
             Expression::Splat { size, value } => vec![self.scalar(frame, value)?; size as usize],
-            Expression::Swizzle { size, vector, pattern } => {
+            Expression::Swizzle {
+                size,
+                vector,
+                pattern,
+            } => {
                 let vector = self.scalars(frame, vector)?;
                 pattern[..size as usize]
                     .iter()
-                    .map(|&c| vector.get(c as usize).copied().ok_or_else(|| Fail::invalid("a swizzle leaves its vector")))
+                    .map(|&c| {
+                        vector
+                            .get(c as usize)
+                            .copied()
+                            .ok_or_else(|| Fail::invalid("a swizzle leaves its vector"))
+                    })
                     .collect::<Result<_, _>>()?
             }
             Expression::AccessIndex { base, index } => match self.operand(frame, base)? {
@@ -99,7 +154,9 @@ impl<'a> Translator<'a> {
             Expression::Access { base, index } => {
                 let index = self.scalar(frame, index)?;
                 match self.operand(frame, base)? {
-                    Operand::Place(place) => return Ok(Operand::Place(self.element_at(&place, index)?)),
+                    Operand::Place(place) => {
+                        return Ok(Operand::Place(self.element_at(&place, index)?));
+                    }
                     Operand::Scalars(values) => {
                         let ty = self.ty(frame, base).clone();
                         self.index_value(&ty, &values, index)?
@@ -108,13 +165,24 @@ impl<'a> Translator<'a> {
                 }
             }
             Expression::FunctionArgument(index) => {
-                return frame.arguments.get(index as usize).cloned().ok_or_else(|| Fail::invalid("an argument is missing"));
+                return frame
+                    .arguments
+                    .get(index as usize)
+                    .cloned()
+                    .ok_or_else(|| Fail::invalid("an argument is missing"));
             }
             Expression::GlobalVariable(global) => {
-                return self.globals.get(&global).cloned().ok_or_else(|| Fail::invalid("a global variable is used that analysis says is not"));
+                return self.globals.get(&global).cloned().ok_or_else(|| {
+                    Fail::invalid("a global variable is used that analysis says is not")
+                });
             }
             Expression::LocalVariable(local) => {
-                return frame.locals.get(&local).cloned().map(Operand::Place).ok_or_else(|| Fail::invalid("a local variable is missing"));
+                return frame
+                    .locals
+                    .get(&local)
+                    .cloned()
+                    .map(Operand::Place)
+                    .ok_or_else(|| Fail::invalid("a local variable is missing"));
             }
             Expression::Load { pointer } => {
                 let place = self.place(frame, pointer)?;
@@ -124,7 +192,13 @@ impl<'a> Translator<'a> {
                 let place = self.place(frame, pointer)?;
                 vec![self.runtime_length(&place)?]
             }
-            Expression::ImageLoad { image, coordinate, array_index, sample, level } => {
+            Expression::ImageLoad {
+                image,
+                coordinate,
+                array_index,
+                sample,
+                level,
+            } => {
                 if sample.is_some() {
                     return Err(Fail::unsupported("multisampled textures"));
                 }
@@ -134,25 +208,55 @@ impl<'a> Translator<'a> {
             Expression::ImageQuery { image, query } => self.image_query(frame, image, query)?,
             Expression::Unary { op, expr } => self.unary(frame, op, expr)?,
             Expression::Binary { op, left, right } => self.binary(frame, op, left, right)?,
-            Expression::Select { condition, accept, reject } => {
+            Expression::Select {
+                condition,
+                accept,
+                reject,
+            } => {
                 let condition = self.scalars(frame, condition)?;
                 let (accept, reject) = (self.scalars(frame, accept)?, self.scalars(frame, reject)?);
                 let width = accept.len();
-                (0..width).map(|i| self.builder.select(condition[if condition.len() == width { i } else { 0 }], accept[i], reject[i])).collect()
+                (0..width)
+                    .map(|i| {
+                        self.builder.select(
+                            condition[if condition.len() == width { i } else { 0 }],
+                            accept[i],
+                            reject[i],
+                        )
+                    })
+                    .collect()
             }
             Expression::Relational { fun, argument } => self.relational(frame, fun, argument)?,
-            Expression::Math { fun, arg, arg1, arg2, arg3 } => self.math(frame, fun, &[Some(arg), arg1, arg2, arg3])?,
-            Expression::As { expr, kind, convert } => self.cast(frame, expr, kind, convert)?,
-            Expression::CallResult(_) | Expression::AtomicResult { .. } | Expression::WorkGroupUniformLoadResult { .. } => {
+            Expression::Math {
+                fun,
+                arg,
+                arg1,
+                arg2,
+                arg3,
+            } => self.math(frame, fun, &[Some(arg), arg1, arg2, arg3])?,
+            Expression::As {
+                expr,
+                kind,
+                convert,
+            } => self.cast(frame, expr, kind, convert)?,
+            Expression::CallResult(_)
+            | Expression::AtomicResult { .. }
+            | Expression::WorkGroupUniformLoadResult { .. } => {
                 return Err(Fail::invalid("a result is used before its statement"));
             }
             Expression::Override(_) => return Err(Fail::invalid("an override was not resolved")),
             Expression::Derivative { .. } => return Err(Fail::unsupported("derivatives")),
-            Expression::RayQueryVertexPositions { .. } | Expression::RayQueryProceedResult | Expression::RayQueryGetIntersection { .. } => {
+            Expression::RayQueryVertexPositions { .. }
+            | Expression::RayQueryProceedResult
+            | Expression::RayQueryGetIntersection { .. } => {
                 return Err(Fail::unsupported("ray queries"));
             }
-            Expression::SubgroupBallotResult | Expression::SubgroupOperationResult { .. } => return Err(Fail::unsupported("subgroup operations")),
-            Expression::CooperativeLoad { .. } | Expression::CooperativeMultiplyAdd { .. } => return Err(Fail::unsupported("cooperative matrices")),
+            Expression::SubgroupBallotResult | Expression::SubgroupOperationResult { .. } => {
+                return Err(Fail::unsupported("subgroup operations"));
+            }
+            Expression::CooperativeLoad { .. } | Expression::CooperativeMultiplyAdd { .. } => {
+                return Err(Fail::unsupported("cooperative matrices"));
+            }
         };
         Ok(Operand::Scalars(values))
     }
@@ -164,20 +268,31 @@ impl<'a> Translator<'a> {
             Literal::I32(value) => self.builder.int(value as u32),
             Literal::Bool(value) => self.builder.bool(value),
             Literal::F16(_) => return Err(Fail::unsupported("16-bit floating-point scalars")),
-            Literal::I16(_) | Literal::U16(_) => return Err(Fail::unsupported("16-bit integer scalars")),
-            Literal::F64(_) | Literal::U64(_) | Literal::I64(_) => return Err(Fail::unsupported("64-bit scalars")),
-            Literal::AbstractInt(_) | Literal::AbstractFloat(_) => return Err(Fail::invalid("an abstract literal was not made concrete")),
+            Literal::I16(_) | Literal::U16(_) => {
+                return Err(Fail::unsupported("16-bit integer scalars"));
+            }
+            Literal::F64(_) | Literal::U64(_) | Literal::I64(_) => {
+                return Err(Fail::unsupported("64-bit scalars"));
+            }
+            Literal::AbstractInt(_) | Literal::AbstractFloat(_) => {
+                return Err(Fail::invalid("an abstract literal was not made concrete"));
+            }
         })
     }
 
     /// A module-scope constant expression.
-    pub(super) fn global_constant(&mut self, expression: Handle<Expression>) -> Result<Vec<Value>, Fail> {
+    pub(super) fn global_constant(
+        &mut self,
+        expression: Handle<Expression>,
+    ) -> Result<Vec<Value>, Fail> {
         if let Some(values) = self.constants.get(&expression) {
             return Ok(values.clone());
         }
         let values = match self.module.global_expressions[expression] {
             Expression::Literal(literal) => vec![self.literal(literal)?],
-            Expression::Constant(constant) => self.global_constant(self.module.constants[constant].init)?,
+            Expression::Constant(constant) => {
+                self.global_constant(self.module.constants[constant].init)?
+            }
             Expression::ZeroValue(ty) => self.zero(self.inner(ty))?,
             Expression::Compose { ref components, .. } => {
                 let mut values = Vec::new();
@@ -204,12 +319,16 @@ impl<'a> Translator<'a> {
                 for member in members.iter().take(index as usize) {
                     start += self.leaves(self.inner(member.ty))?.len();
                 }
-                let member = members.get(index as usize).ok_or_else(|| Fail::invalid("a member index is out of range"))?;
+                let member = members
+                    .get(index as usize)
+                    .ok_or_else(|| Fail::invalid("a member index is out of range"))?;
                 Ok((start, self.leaves(self.inner(member.ty))?.len()))
             }
             _ => {
                 let count = self.element_leaves(ty)?;
-                let start = count.checked_mul(index as usize).ok_or_else(|| Fail::invalid("an index is out of range"))?;
+                let start = count
+                    .checked_mul(index as usize)
+                    .ok_or_else(|| Fail::invalid("an index is out of range"))?;
                 Ok((start, count))
             }
         }
@@ -225,7 +344,12 @@ impl<'a> Translator<'a> {
     }
 
     /// An element of a value at a computed index.
-    fn index_value(&mut self, ty: &TypeInner, values: &[Value], index: Value) -> Result<Vec<Value>, Fail> {
+    fn index_value(
+        &mut self,
+        ty: &TypeInner,
+        values: &[Value],
+        index: Value,
+    ) -> Result<Vec<Value>, Fail> {
         let width = self.element_leaves(ty)?;
         if width == 0 || values.is_empty() {
             return Err(Fail::invalid("a value without elements is indexed"));
@@ -239,16 +363,29 @@ impl<'a> Translator<'a> {
         let mut result = Vec::with_capacity(width);
         for part in 0..width {
             let column: Vec<Value> = values.iter().skip(part).step_by(width).copied().collect();
-            let bits: Option<Vec<u32>> = column.iter().map(|&value| self.builder.constant_bits(value)).collect();
+            let bits: Option<Vec<u32>> = column
+                .iter()
+                .map(|&value| self.builder.constant_bits(value))
+                .collect();
             let class = self.builder.class(column[0]);
             let value = match bits {
                 Some(bits) if count > 4 => {
                     let tables = &mut self.builder.tree.resources.tables;
-                    let table = tables.iter().position(|table| *table == bits).unwrap_or_else(|| {
-                        tables.push(bits);
-                        tables.len() - 1
-                    });
-                    self.builder.op(Op::Table { table: table as u32, class }, &[index], &[class])[0]
+                    let table = tables
+                        .iter()
+                        .position(|table| *table == bits)
+                        .unwrap_or_else(|| {
+                            tables.push(bits);
+                            tables.len() - 1
+                        });
+                    self.builder.op(
+                        Op::Table {
+                            table: table as u32,
+                            class,
+                        },
+                        &[index],
+                        &[class],
+                    )[0]
                 }
                 _ => {
                     let mut value = column[count - 1];
@@ -265,32 +402,54 @@ impl<'a> Translator<'a> {
         Ok(result)
     }
 
-    fn unary(&mut self, frame: &mut Frame<'a>, op: UnaryOperator, operand: Handle<Expression>) -> Result<Vec<Value>, Fail> {
+    fn unary(
+        &mut self,
+        frame: &mut Frame<'a>,
+        op: UnaryOperator,
+        operand: Handle<Expression>,
+    ) -> Result<Vec<Value>, Fail> {
         let kind = self.kind(frame, operand)?;
         let values = self.scalars(frame, operand)?;
         Ok(values
             .into_iter()
             .map(|value| match (op, kind) {
-                (UnaryOperator::Negate, ScalarKind::Float) => self.builder.arith(Arith::NegF, &[value]),
+                (UnaryOperator::Negate, ScalarKind::Float) => {
+                    self.builder.arith(Arith::NegF, &[value])
+                }
                 (UnaryOperator::Negate, _) => {
                     let zero = self.builder.int(0);
                     self.builder.arith(Arith::SubI, &[zero, value])
                 }
-                (UnaryOperator::LogicalNot | UnaryOperator::BitwiseNot, _) => self.builder.arith(Arith::Not, &[value]),
+                (UnaryOperator::LogicalNot | UnaryOperator::BitwiseNot, _) => {
+                    self.builder.arith(Arith::Not, &[value])
+                }
             })
             .collect())
     }
 
-    fn binary(&mut self, frame: &mut Frame<'a>, op: BinaryOperator, left: Handle<Expression>, right: Handle<Expression>) -> Result<Vec<Value>, Fail> {
+    fn binary(
+        &mut self,
+        frame: &mut Frame<'a>,
+        op: BinaryOperator,
+        left: Handle<Expression>,
+        right: Handle<Expression>,
+    ) -> Result<Vec<Value>, Fail> {
         let kind = self.kind(frame, left)?;
         let (a, b) = (self.scalars(frame, left)?, self.scalars(frame, right)?);
         if op == BinaryOperator::Multiply {
             match (self.ty(frame, left), self.ty(frame, right)) {
-                (&TypeInner::Matrix { columns, rows, .. }, TypeInner::Matrix { .. }) => return Ok(self.matrix_product(&a, columns as usize, rows as usize, &b)),
-                (&TypeInner::Matrix { columns, rows, .. }, TypeInner::Vector { .. }) => return Ok(self.matrix_product(&a, columns as usize, rows as usize, &b)),
+                (&TypeInner::Matrix { columns, rows, .. }, TypeInner::Matrix { .. }) => {
+                    return Ok(self.matrix_product(&a, columns as usize, rows as usize, &b));
+                }
+                (&TypeInner::Matrix { columns, rows, .. }, TypeInner::Vector { .. }) => {
+                    return Ok(self.matrix_product(&a, columns as usize, rows as usize, &b));
+                }
                 (TypeInner::Vector { .. }, &TypeInner::Matrix { rows, .. }) => {
                     // Each column dotted with the vector.
-                    return Ok(b.chunks(rows as usize).map(|column| self.dot(Class::Float, &a, column)).collect());
+                    return Ok(b
+                        .chunks(rows as usize)
+                        .map(|column| self.dot(Class::Float, &a, column))
+                        .collect());
                 }
                 _ => {}
             }
@@ -304,7 +463,13 @@ impl<'a> Translator<'a> {
         Ok(result)
     }
 
-    fn binary_scalar(&mut self, op: BinaryOperator, kind: ScalarKind, a: Value, b: Value) -> Result<Value, Fail> {
+    fn binary_scalar(
+        &mut self,
+        op: BinaryOperator,
+        kind: ScalarKind,
+        a: Value,
+        b: Value,
+    ) -> Result<Value, Fail> {
         use BinaryOperator as B;
         use ScalarKind as K;
         let (arith, swap) = match (op, kind) {
@@ -343,15 +508,27 @@ impl<'a> Translator<'a> {
             (B::ShiftRight, K::Sint) => (Arith::ShrS, false),
             (B::ShiftRight, _) => (Arith::ShrU, false),
         };
-        Ok(if swap { self.builder.arith(arith, &[b, a]) } else { self.builder.arith(arith, &[a, b]) })
+        Ok(if swap {
+            self.builder.arith(arith, &[b, a])
+        } else {
+            self.builder.arith(arith, &[a, b])
+        })
     }
 
     /// Matrix times the columns in `right`, each summed from the first column on.
-    pub(super) fn matrix_product(&mut self, left: &[Value], columns: usize, rows: usize, right: &[Value]) -> Vec<Value> {
+    pub(super) fn matrix_product(
+        &mut self,
+        left: &[Value],
+        columns: usize,
+        rows: usize,
+        right: &[Value],
+    ) -> Vec<Value> {
         let mut result = Vec::with_capacity(rows * right.len() / columns.max(1));
         for vector in right.chunks(columns) {
             for row in 0..rows {
-                let elements: Vec<Value> = (0..columns).map(|column| left[column * rows + row]).collect();
+                let elements: Vec<Value> = (0..columns)
+                    .map(|column| left[column * rows + row])
+                    .collect();
                 result.push(self.dot(Class::Float, &elements, vector));
             }
         }
@@ -375,18 +552,29 @@ impl<'a> Translator<'a> {
         sum.unwrap_or_else(|| self.builder.constant(class, 0))
     }
 
-    fn relational(&mut self, frame: &mut Frame<'a>, function: RelationalFunction, argument: Handle<Expression>) -> Result<Vec<Value>, Fail> {
+    fn relational(
+        &mut self,
+        frame: &mut Frame<'a>,
+        function: RelationalFunction,
+        argument: Handle<Expression>,
+    ) -> Result<Vec<Value>, Fail> {
         let values = self.scalars(frame, argument)?;
         let mut fold = |op: Arith| {
             let mut values = values.iter().copied();
             let first = values.next();
-            let all = values.fold(first, |all, value| all.map(|all| self.builder.arith(op, &[all, value])));
-            all.map(|all| vec![all]).ok_or_else(|| Fail::invalid("`all` or `any` of nothing"))
+            let all = values.fold(first, |all, value| {
+                all.map(|all| self.builder.arith(op, &[all, value]))
+            });
+            all.map(|all| vec![all])
+                .ok_or_else(|| Fail::invalid("`all` or `any` of nothing"))
         };
         match function {
             RelationalFunction::All => fold(Arith::And),
             RelationalFunction::Any => fold(Arith::Or),
-            RelationalFunction::IsNan => Ok(values.into_iter().map(|v| self.builder.arith(Arith::NeF, &[v, v])).collect()),
+            RelationalFunction::IsNan => Ok(values
+                .into_iter()
+                .map(|v| self.builder.arith(Arith::NeF, &[v, v]))
+                .collect()),
             RelationalFunction::IsInf => Ok(values
                 .into_iter()
                 .map(|v| {
@@ -398,19 +586,37 @@ impl<'a> Translator<'a> {
         }
     }
 
-    fn cast(&mut self, frame: &mut Frame<'a>, expression: Handle<Expression>, to: ScalarKind, convert: Option<u8>) -> Result<Vec<Value>, Fail> {
+    fn cast(
+        &mut self,
+        frame: &mut Frame<'a>,
+        expression: Handle<Expression>,
+        to: ScalarKind,
+        convert: Option<u8>,
+    ) -> Result<Vec<Value>, Fail> {
         let from = self.kind(frame, expression)?;
         let values = self.scalars(frame, expression)?;
         if let Some(width) = convert
             && width != 4
             && to != ScalarKind::Bool
         {
-            return Err(Fail::unsupported(format!("{}-bit scalars", u32::from(width) * 8)));
+            return Err(Fail::unsupported(format!(
+                "{}-bit scalars",
+                u32::from(width) * 8
+            )));
         }
-        Ok(values.into_iter().map(|value| self.cast_scalar(value, from, to, convert.is_some())).collect())
+        Ok(values
+            .into_iter()
+            .map(|value| self.cast_scalar(value, from, to, convert.is_some()))
+            .collect())
     }
 
-    fn cast_scalar(&mut self, value: Value, from: ScalarKind, to: ScalarKind, convert: bool) -> Value {
+    fn cast_scalar(
+        &mut self,
+        value: Value,
+        from: ScalarKind,
+        to: ScalarKind,
+        convert: bool,
+    ) -> Value {
         use ScalarKind as K;
         if !convert {
             return match (class_of(from), class_of(to)) {
@@ -446,5 +652,8 @@ impl<'a> Translator<'a> {
 }
 
 fn slice(values: &[Value], start: usize, count: usize) -> Result<Vec<Value>, Fail> {
-    values.get(start..start.saturating_add(count)).map(<[Value]>::to_vec).ok_or_else(|| Fail::invalid("an index is out of range"))
+    values
+        .get(start..start.saturating_add(count))
+        .map(<[Value]>::to_vec)
+        .ok_or_else(|| Fail::invalid("an index is out of range"))
 }

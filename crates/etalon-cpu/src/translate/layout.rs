@@ -20,7 +20,11 @@ impl Leaf {
 }
 
 pub(super) fn class_of(kind: ScalarKind) -> Class {
-    if kind == ScalarKind::Float { Class::Float } else { Class::Int }
+    if kind == ScalarKind::Float {
+        Class::Float
+    } else {
+        Class::Int
+    }
 }
 
 /// Most scalars a single value may have: a limit on what is flattened, so that
@@ -37,33 +41,63 @@ impl<'a> Translator<'a> {
 
     fn collect_leaves(&self, ty: &TypeInner, offset: u32, out: &mut Vec<Leaf>) -> Result<(), Fail> {
         if out.len() > MAX_LEAVES {
-            return Err(Fail::TooLarge { what: "number of scalars in a value", size: out.len() as u64, limit: MAX_LEAVES as u64 });
+            return Err(Fail::TooLarge {
+                what: "number of scalars in a value",
+                size: out.len() as u64,
+                limit: MAX_LEAVES as u64,
+            });
         }
         match *ty {
-            TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => out.push(Leaf { kind: supported(scalar)?, offset }),
+            TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => out.push(Leaf {
+                kind: supported(scalar)?,
+                offset,
+            }),
             TypeInner::Vector { size, scalar } => {
                 let kind = supported(scalar)?;
-                out.extend((0..size as u32).map(|i| Leaf { kind, offset: offset.saturating_add(4 * i) }));
+                out.extend((0..size as u32).map(|i| Leaf {
+                    kind,
+                    offset: offset.saturating_add(4 * i),
+                }));
             }
-            TypeInner::Matrix { columns, rows, scalar } => {
+            TypeInner::Matrix {
+                columns,
+                rows,
+                scalar,
+            } => {
                 let kind = supported(scalar)?;
                 for column in 0..columns as u32 {
                     let start = offset.saturating_add(column * column_stride(rows));
-                    out.extend((0..rows as u32).map(|row| Leaf { kind, offset: start.saturating_add(4 * row) }));
+                    out.extend((0..rows as u32).map(|row| Leaf {
+                        kind,
+                        offset: start.saturating_add(4 * row),
+                    }));
                 }
             }
             TypeInner::Array { base, size, stride } => {
                 let count = fixed_length(size)?;
                 for i in 0..count {
-                    self.collect_leaves(&self.module.types[base].inner, offset.saturating_add(i.saturating_mul(stride)), out)?;
+                    self.collect_leaves(
+                        &self.module.types[base].inner,
+                        offset.saturating_add(i.saturating_mul(stride)),
+                        out,
+                    )?;
                 }
             }
             TypeInner::Struct { ref members, .. } => {
                 for member in members {
-                    self.collect_leaves(&self.module.types[member.ty].inner, offset.saturating_add(member.offset), out)?;
+                    self.collect_leaves(
+                        &self.module.types[member.ty].inner,
+                        offset.saturating_add(member.offset),
+                        out,
+                    )?;
                 }
             }
-            ref other => return Err(Fail::unsupported(format!("values of type {}", describe(other)))),
+            ref other => {
+                return Err(Fail::unsupported(format!(
+                    "values of type {}",
+                    describe(other)
+                )));
+            }
         }
         Ok(())
     }
@@ -93,15 +127,23 @@ pub(super) fn column_stride(rows: naga::VectorSize) -> u32 {
 pub(super) fn fixed_length(size: ArraySize) -> Result<u32, Fail> {
     match size {
         ArraySize::Constant(count) => Ok(count.get()),
-        ArraySize::Pending(_) => Err(Fail::invalid("an array's size is an override that was not resolved")),
+        ArraySize::Pending(_) => Err(Fail::invalid(
+            "an array's size is an override that was not resolved",
+        )),
         ArraySize::Dynamic => Err(Fail::invalid("a runtime-sized array is used as a value")),
     }
 }
 
 fn supported(scalar: naga::Scalar) -> Result<ScalarKind, Fail> {
     match (scalar.kind, scalar.width) {
-        (ScalarKind::Bool, _) | (ScalarKind::Float | ScalarKind::Sint | ScalarKind::Uint, 4) => Ok(scalar.kind),
-        (kind, width) => Err(Fail::unsupported(format!("{}-bit {} scalars", u32::from(width) * 8, describe_kind(kind)))),
+        (ScalarKind::Bool, _) | (ScalarKind::Float | ScalarKind::Sint | ScalarKind::Uint, 4) => {
+            Ok(scalar.kind)
+        }
+        (kind, width) => Err(Fail::unsupported(format!(
+            "{}-bit {} scalars",
+            u32::from(width) * 8,
+            describe_kind(kind)
+        ))),
     }
 }
 

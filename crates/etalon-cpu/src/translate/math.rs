@@ -7,7 +7,12 @@ use super::{Fail, Frame, Translator};
 use crate::ir::{Arith, Class, Value};
 
 impl<'a> Translator<'a> {
-    pub(super) fn math(&mut self, frame: &mut Frame<'a>, function: MathFunction, arguments: &[Option<Handle<Expression>>; 4]) -> Result<Vec<Value>, Fail> {
+    pub(super) fn math(
+        &mut self,
+        frame: &mut Frame<'a>,
+        function: MathFunction,
+        arguments: &[Option<Handle<Expression>>; 4],
+    ) -> Result<Vec<Value>, Fail> {
         use MathFunction as M;
         let Some(first) = arguments[0] else {
             return Err(Fail::invalid("a built-in function without arguments"));
@@ -18,29 +23,57 @@ impl<'a> Translator<'a> {
             args.push(self.scalars(frame, argument)?);
         }
         let needed = match function {
-            M::Clamp | M::Mix | M::Fma | M::SmoothStep | M::FaceForward | M::Refract | M::ExtractBits => 3,
+            M::Clamp
+            | M::Mix
+            | M::Fma
+            | M::SmoothStep
+            | M::FaceForward
+            | M::Refract
+            | M::ExtractBits => 3,
             M::InsertBits => 4,
-            M::Min | M::Max | M::Pow | M::Atan2 | M::Ldexp | M::Step | M::Dot | M::Dot4I8Packed | M::Dot4U8Packed | M::Cross | M::Distance | M::Reflect => 2,
+            M::Min
+            | M::Max
+            | M::Pow
+            | M::Atan2
+            | M::Ldexp
+            | M::Step
+            | M::Dot
+            | M::Dot4I8Packed
+            | M::Dot4U8Packed
+            | M::Cross
+            | M::Distance
+            | M::Reflect => 2,
             _ => 1,
         };
         if args.len() != needed {
-            return Err(Fail::invalid("a built-in function with a wrong number of arguments"));
+            return Err(Fail::invalid(
+                "a built-in function with a wrong number of arguments",
+            ));
         }
         match function {
             M::Transpose => {
                 let TypeInner::Matrix { columns, rows, .. } = *self.ty(frame, first) else {
-                    return Err(Fail::invalid("a transpose of something other than a matrix"));
+                    return Err(Fail::invalid(
+                        "a transpose of something other than a matrix",
+                    ));
                 };
                 let (columns, rows) = (columns as usize, rows as usize);
-                return Ok((0..rows).flat_map(|row| (0..columns).map(move |column| column * rows + row)).map(|i| args[0][i]).collect());
+                return Ok((0..rows)
+                    .flat_map(|row| (0..columns).map(move |column| column * rows + row))
+                    .map(|i| args[0][i])
+                    .collect());
             }
             M::Determinant => {
                 let TypeInner::Matrix { columns, .. } = *self.ty(frame, first) else {
-                    return Err(Fail::invalid("a determinant of something other than a matrix"));
+                    return Err(Fail::invalid(
+                        "a determinant of something other than a matrix",
+                    ));
                 };
                 return Ok(vec![self.determinant(&args[0], columns)]);
             }
-            M::Inverse | M::Outer => return Err(Fail::unsupported(format!("the function {function:?}"))),
+            M::Inverse | M::Outer => {
+                return Err(Fail::unsupported(format!("the function {function:?}")));
+            }
             _ => {}
         }
         if let Some(values) = self.geometric(function, kind, &args) {
@@ -54,7 +87,10 @@ impl<'a> Translator<'a> {
         let mut results = Vec::with_capacity(width);
         let mut second_results = Vec::new();
         for i in 0..width {
-            let x: Vec<Value> = args.iter().map(|values| values[if values.len() == 1 { 0 } else { i }]).collect();
+            let x: Vec<Value> = args
+                .iter()
+                .map(|values| values[if values.len() == 1 { 0 } else { i }])
+                .collect();
             match function {
                 M::Modf => {
                     let whole = self.builder.arith(Arith::TruncF, &x);
@@ -74,7 +110,12 @@ impl<'a> Translator<'a> {
     }
 
     /// Functions that work component by component.
-    fn component(&mut self, function: MathFunction, kind: ScalarKind, x: &[Value]) -> Result<Value, Fail> {
+    fn component(
+        &mut self,
+        function: MathFunction,
+        kind: ScalarKind,
+        x: &[Value],
+    ) -> Result<Value, Fail> {
         use MathFunction as M;
         use ScalarKind as K;
         let b = &mut self.builder;
@@ -160,7 +201,8 @@ impl<'a> Translator<'a> {
                         b.select(reached, one, zero)
                     }
                     M::SmoothStep => {
-                        let (zero, one, two, three) = (b.float(0.0), b.float(1.0), b.float(2.0), b.float(3.0));
+                        let (zero, one, two, three) =
+                            (b.float(0.0), b.float(1.0), b.float(2.0), b.float(3.0));
                         let along = b.arith(Arith::SubF, &[x[2], x[0]]);
                         let width = b.arith(Arith::SubF, &[x[1], x[0]]);
                         let t = b.arith(Arith::DivF, &[along, width]);
@@ -220,7 +262,14 @@ impl<'a> Translator<'a> {
         let up = b.arith(Arith::SubI, &[width, used]);
         let down = b.arith(Arith::SubI, &[width, count]);
         let high = b.arith(Arith::Shl, &[x[0], up]);
-        let low = b.arith(if kind == ScalarKind::Sint { Arith::ShrS } else { Arith::ShrU }, &[high, down]);
+        let low = b.arith(
+            if kind == ScalarKind::Sint {
+                Arith::ShrS
+            } else {
+                Arith::ShrU
+            },
+            &[high, down],
+        );
         let empty = b.arith(Arith::EqI, &[count, zero]);
         b.select(empty, zero, low)
     }
@@ -268,11 +317,19 @@ impl<'a> Translator<'a> {
         let is_finite = b.arith(Arith::LtF, &[magnitude, infinity]);
         let regular = b.arith(Arith::And, &[is_positive, is_finite]);
         let none = b.int(0);
-        (b.select(regular, fraction, x), b.select(regular, exponent, none))
+        (
+            b.select(regular, fraction, x),
+            b.select(regular, exponent, none),
+        )
     }
 
     /// Functions on whole vectors.
-    fn geometric(&mut self, function: MathFunction, kind: ScalarKind, args: &[Vec<Value>]) -> Option<Vec<Value>> {
+    fn geometric(
+        &mut self,
+        function: MathFunction,
+        kind: ScalarKind,
+        args: &[Vec<Value>],
+    ) -> Option<Vec<Value>> {
         use MathFunction as M;
         let class = super::layout::class_of(kind);
         Some(match function {
@@ -332,14 +389,23 @@ impl<'a> Translator<'a> {
                 let bent = self.each(Arith::MulF, incident, &[eta]);
                 let along = self.each(Arith::MulF, normal, &[factor]);
                 let refracted = self.each(Arith::SubF, &bent, &along);
-                refracted.into_iter().map(|value| self.builder.select(total, zero, value)).collect()
+                refracted
+                    .into_iter()
+                    .map(|value| self.builder.select(total, zero, value))
+                    .collect()
             }
             _ => return None,
         })
     }
 
     fn each(&mut self, op: Arith, a: &[Value], b: &[Value]) -> Vec<Value> {
-        a.iter().enumerate().map(|(i, &a)| self.builder.arith(op, &[a, b[if b.len() == 1 { 0 } else { i }]])).collect()
+        a.iter()
+            .enumerate()
+            .map(|(i, &a)| {
+                self.builder
+                    .arith(op, &[a, b[if b.len() == 1 { 0 } else { i }]])
+            })
+            .collect()
     }
 
     fn length(&mut self, vector: &[Value]) -> Value {
@@ -365,17 +431,26 @@ impl<'a> Translator<'a> {
         for (i, &row) in rows.iter().enumerate() {
             let others: Vec<usize> = rows.iter().copied().filter(|&r| r != row).collect();
             let minor = self.minor(m, n, column + 1, &others);
-            let product = self.builder.arith(Arith::MulF, &[m[column * n + row], minor]);
+            let product = self
+                .builder
+                .arith(Arith::MulF, &[m[column * n + row], minor]);
             sum = Some(match sum {
                 None => product,
-                Some(sum) => self.builder.arith(if i % 2 == 1 { Arith::SubF } else { Arith::AddF }, &[sum, product]),
+                Some(sum) => self.builder.arith(
+                    if i % 2 == 1 { Arith::SubF } else { Arith::AddF },
+                    &[sum, product],
+                ),
             });
         }
         sum.unwrap_or_else(|| self.builder.float(0.0))
     }
 
     /// Functions between numbers and the bytes or halves of a word.
-    fn packing(&mut self, function: MathFunction, args: &[Vec<Value>]) -> Result<Option<Vec<Value>>, Fail> {
+    fn packing(
+        &mut self,
+        function: MathFunction,
+        args: &[Vec<Value>],
+    ) -> Result<Option<Vec<Value>>, Fail> {
         use MathFunction as M;
         let x = &args[0];
         Ok(Some(match function {
@@ -384,14 +459,25 @@ impl<'a> Translator<'a> {
             M::Pack2x16snorm => vec![self.pack_normalised(x, 16, true)],
             M::Pack2x16unorm => vec![self.pack_normalised(x, 16, false)],
             M::Pack2x16float => {
-                let halves: Vec<Value> = x.iter().map(|&v| self.builder.arith(Arith::FToHalf, &[v])).collect();
+                let halves: Vec<Value> = x
+                    .iter()
+                    .map(|&v| self.builder.arith(Arith::FToHalf, &[v]))
+                    .collect();
                 vec![self.join(&halves, 16)]
             }
             M::Pack4xI8 | M::Pack4xU8 => vec![self.join(x, 8)],
             M::Pack4xI8Clamp | M::Pack4xU8Clamp => {
                 let signed = function == M::Pack4xI8Clamp;
-                let (low, high) = if signed { (self.builder.int((-128_i32) as u32), self.builder.int(127)) } else { (self.builder.int(0), self.builder.int(255)) };
-                let (max, min) = if signed { (Arith::MaxS, Arith::MinS) } else { (Arith::MaxU, Arith::MinU) };
+                let (low, high) = if signed {
+                    (self.builder.int((-128_i32) as u32), self.builder.int(127))
+                } else {
+                    (self.builder.int(0), self.builder.int(255))
+                };
+                let (max, min) = if signed {
+                    (Arith::MaxS, Arith::MinS)
+                } else {
+                    (Arith::MaxU, Arith::MinU)
+                };
                 let clamped = self.each(max, x, &[low]);
                 let clamped = self.each(min, &clamped, &[high]);
                 vec![self.join(&clamped, 8)]
@@ -402,13 +488,19 @@ impl<'a> Translator<'a> {
             M::Unpack2x16unorm => self.unpack_normalised(x[0], 16, false),
             M::Unpack2x16float => {
                 let halves = self.split(x[0], 16, false);
-                halves.into_iter().map(|half| self.builder.arith(Arith::HalfToF, &[half])).collect()
+                halves
+                    .into_iter()
+                    .map(|half| self.builder.arith(Arith::HalfToF, &[half]))
+                    .collect()
             }
             M::Unpack4xI8 => self.split(x[0], 8, true),
             M::Unpack4xU8 => self.split(x[0], 8, false),
             M::Dot4I8Packed | M::Dot4U8Packed => {
                 let signed = function == M::Dot4I8Packed;
-                let (a, b) = (self.split(x[0], 8, signed), self.split(args[1][0], 8, signed));
+                let (a, b) = (
+                    self.split(x[0], 8, signed),
+                    self.split(args[1][0], 8, signed),
+                );
                 vec![self.dot(Class::Int, &a, &b)]
             }
             _ => return Ok(None),
@@ -417,9 +509,18 @@ impl<'a> Translator<'a> {
 
     /// `floor(0.5 + scale * clamp(x))` of each component, as WGSL defines.
     fn pack_normalised(&mut self, x: &[Value], bits: u32, signed: bool) -> Value {
-        let scale = if signed { (1_u32 << (bits - 1)) - 1 } else { (1 << bits) - 1 };
+        let scale = if signed {
+            (1_u32 << (bits - 1)) - 1
+        } else {
+            (1 << bits) - 1
+        };
         let b = &mut self.builder;
-        let (low, one, scale, half) = (b.float(if signed { -1.0 } else { 0.0 }), b.float(1.0), b.float(scale as f32), b.float(0.5));
+        let (low, one, scale, half) = (
+            b.float(if signed { -1.0 } else { 0.0 }),
+            b.float(1.0),
+            b.float(scale as f32),
+            b.float(0.5),
+        );
         let parts: Vec<Value> = x
             .iter()
             .map(|&v| {
@@ -435,7 +536,11 @@ impl<'a> Translator<'a> {
     }
 
     fn unpack_normalised(&mut self, x: Value, bits: u32, signed: bool) -> Vec<Value> {
-        let scale = if signed { (1_u32 << (bits - 1)) - 1 } else { (1 << bits) - 1 };
+        let scale = if signed {
+            (1_u32 << (bits - 1)) - 1
+        } else {
+            (1 << bits) - 1
+        };
         let parts = self.split(x, bits, signed);
         let b = &mut self.builder;
         let (scale, least) = (b.float(scale as f32), b.float(-1.0));
@@ -444,7 +549,11 @@ impl<'a> Translator<'a> {
             .map(|part| {
                 let v = b.arith(if signed { Arith::SToF } else { Arith::UToF }, &[part]);
                 let v = b.arith(Arith::DivF, &[v, scale]);
-                if signed { b.arith(Arith::MaxF, &[v, least]) } else { v }
+                if signed {
+                    b.arith(Arith::MaxF, &[v, least])
+                } else {
+                    v
+                }
             })
             .collect()
     }
@@ -470,7 +579,10 @@ impl<'a> Translator<'a> {
             .map(|i| {
                 let (up, down) = (b.int(32 - bits * (i + 1)), b.int(32 - bits));
                 let high = b.arith(Arith::Shl, &[word, up]);
-                b.arith(if signed { Arith::ShrS } else { Arith::ShrU }, &[high, down])
+                b.arith(
+                    if signed { Arith::ShrS } else { Arith::ShrU },
+                    &[high, down],
+                )
             })
             .collect()
     }

@@ -13,7 +13,10 @@ mod statement;
 use std::collections::{HashMap, HashSet};
 
 use naga::valid::{FunctionInfo, ModuleInfo};
-use naga::{AddressSpace, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, Span, TypeInner};
+use naga::{
+    AddressSpace, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, Span,
+    TypeInner,
+};
 
 use self::builder::Builder;
 use self::layout::class_of;
@@ -26,7 +29,11 @@ use crate::ir::{Input, Op, ScopeId, Tree, Value, Variable};
 pub(crate) enum Fail {
     Unsupported(String),
     Invalid(String),
-    TooLarge { what: &'static str, size: u64, limit: u64 },
+    TooLarge {
+        what: &'static str,
+        size: u64,
+        limit: u64,
+    },
 }
 
 impl Fail {
@@ -86,7 +93,11 @@ pub(crate) struct Translator<'a> {
 /// Translates the entry point of the given index.
 ///
 /// On failure the span is of what could not be translated.
-pub(crate) fn translate(module: &Module, info: &ModuleInfo, entry_point: usize) -> Result<Translation, (Fail, Span)> {
+pub(crate) fn translate(
+    module: &Module,
+    info: &ModuleInfo,
+    entry_point: usize,
+) -> Result<Translation, (Fail, Span)> {
     let mut translator = Translator {
         module,
         info,
@@ -99,7 +110,10 @@ pub(crate) fn translate(module: &Module, info: &ModuleInfo, entry_point: usize) 
         workgroup_size: module.entry_points[entry_point].workgroup_size,
     };
     match translator.entry_point(entry_point) {
-        Ok(()) => Ok(Translation { bindings: translator.bindings, tree: translator.builder.finish() }),
+        Ok(()) => Ok(Translation {
+            bindings: translator.bindings,
+            tree: translator.builder.finish(),
+        }),
         Err(fail) => Err((fail, translator.builder.span)),
     }
 }
@@ -111,18 +125,30 @@ impl<'a> Translator<'a> {
         self.declare_globals(info)?;
         let mut arguments = Vec::new();
         for argument in &entry.function.arguments {
-            arguments.push(Operand::Scalars(self.entry_argument(argument.ty, argument.binding.as_ref())?));
+            arguments.push(Operand::Scalars(
+                self.entry_argument(argument.ty, argument.binding.as_ref())?,
+            ));
         }
         let scope = self.builder.new_scope();
         let mut frame = self.frame(&entry.function, info, arguments, scope)?;
         self.builder.begin();
-        let falls_through = self.block(&mut frame, statement::Sequence::of(&entry.function.body), &[scope])?;
+        let falls_through = self.block(
+            &mut frame,
+            statement::Sequence::of(&entry.function.body),
+            &[scope],
+        )?;
         let body = self.builder.end(falls_through);
         self.builder.finish_scope(scope, body);
         Ok(())
     }
 
-    fn frame(&mut self, function: &'a Function, info: &'a FunctionInfo, arguments: Vec<Operand>, scope: ScopeId) -> Result<Frame<'a>, Fail> {
+    fn frame(
+        &mut self,
+        function: &'a Function,
+        info: &'a FunctionInfo,
+        arguments: Vec<Operand>,
+        scope: ScopeId,
+    ) -> Result<Frame<'a>, Fail> {
         let mut frame = Frame {
             function,
             info,
@@ -142,7 +168,8 @@ impl<'a> Translator<'a> {
         let indexed = self.indexed.locals(function);
         for (handle, local) in function.local_variables.iter() {
             self.builder.span = function.local_variables.get_span(handle);
-            let place = self.private_place(self.inner(local.ty).clone(), indexed.contains(&handle))?;
+            let place =
+                self.private_place(self.inner(local.ty).clone(), indexed.contains(&handle))?;
             let initial = match local.init {
                 Some(init) => self.scalars(&mut frame, init)?,
                 None => self.zero(self.inner(local.ty))?,
@@ -163,7 +190,11 @@ impl<'a> Translator<'a> {
             let ty = self.inner(global.ty);
             let operand = match global.space {
                 AddressSpace::Uniform | AddressSpace::Storage { .. } | AddressSpace::Handle => {
-                    let index = u16::try_from(self.bindings.len()).map_err(|_| Fail::TooLarge { what: "number of bindings", size: self.bindings.len() as u64, limit: 1 << 16 })?;
+                    let index = u16::try_from(self.bindings.len()).map_err(|_| Fail::TooLarge {
+                        what: "number of bindings",
+                        size: self.bindings.len() as u64,
+                        limit: 1 << 16,
+                    })?;
                     let binding = describe_binding(self.module, global)?;
                     names.insert(binding.name.clone());
                     let constant = !binding.is_writable();
@@ -175,7 +206,8 @@ impl<'a> Translator<'a> {
                 }
                 AddressSpace::WorkGroup => Operand::Place(self.workgroup_place(ty.clone())?),
                 AddressSpace::Private => {
-                    let place = self.private_place(ty.clone(), self.indexed.globals.contains(&handle))?;
+                    let place =
+                        self.private_place(ty.clone(), self.indexed.globals.contains(&handle))?;
                     let initial = match global.init {
                         Some(init) => self.global_constant(init)?,
                         None => self.zero(ty)?,
@@ -184,7 +216,11 @@ impl<'a> Translator<'a> {
                     self.private_variables.extend(place.variables());
                     Operand::Place(place)
                 }
-                space => return Err(Fail::unsupported(format!("variables in the address space {space:?}"))),
+                space => {
+                    return Err(Fail::unsupported(format!(
+                        "variables in the address space {space:?}"
+                    )));
+                }
             };
             self.globals.insert(handle, operand);
         }
@@ -192,7 +228,11 @@ impl<'a> Translator<'a> {
     }
 
     /// A built-in input, or a struct of them.
-    fn entry_argument(&mut self, ty: Handle<naga::Type>, binding: Option<&naga::Binding>) -> Result<Vec<Value>, Fail> {
+    fn entry_argument(
+        &mut self,
+        ty: Handle<naga::Type>,
+        binding: Option<&naga::Binding>,
+    ) -> Result<Vec<Value>, Fail> {
         match (binding, self.inner(ty)) {
             (Some(naga::Binding::BuiltIn(builtin)), _) => self.builtin(*builtin),
             (None, TypeInner::Struct { members, .. }) => {
@@ -202,7 +242,9 @@ impl<'a> Translator<'a> {
                 }
                 Ok(values)
             }
-            _ => Err(Fail::unsupported("inputs of compute shaders other than built-in ones")),
+            _ => Err(Fail::unsupported(
+                "inputs of compute shaders other than built-in ones",
+            )),
         }
     }
 
@@ -212,8 +254,12 @@ impl<'a> Translator<'a> {
         let values = match builtin {
             B::LocalInvocationId => (0..3).map(|axis| self.local_id(axis)).collect(),
             B::LocalInvocationIndex => vec![self.input(Input::LocalIndex)],
-            B::WorkGroupId => (0..3).map(|axis| self.input(Input::WorkgroupId(axis))).collect(),
-            B::NumWorkGroups => (0..3).map(|axis| self.input(Input::NumWorkgroups(axis))).collect(),
+            B::WorkGroupId => (0..3)
+                .map(|axis| self.input(Input::WorkgroupId(axis)))
+                .collect(),
+            B::NumWorkGroups => (0..3)
+                .map(|axis| self.input(Input::NumWorkgroups(axis)))
+                .collect(),
             B::GlobalInvocationId => (0..3_u8)
                 .map(|axis| {
                     let size = self.builder.int(size[usize::from(axis)]);
@@ -237,11 +283,16 @@ impl<'a> Translator<'a> {
     }
 
     fn input(&mut self, input: Input) -> Value {
-        self.builder.op(Op::Input(input), &[], &[crate::ir::Class::Int])[0]
+        self.builder
+            .op(Op::Input(input), &[], &[crate::ir::Class::Int])[0]
     }
 
     /// The zero value of a type.
     fn zero(&mut self, ty: &TypeInner) -> Result<Vec<Value>, Fail> {
-        Ok(self.leaves(ty)?.into_iter().map(|leaf| self.builder.constant(class_of(leaf.kind), 0)).collect())
+        Ok(self
+            .leaves(ty)?
+            .into_iter()
+            .map(|leaf| self.builder.constant(class_of(leaf.kind), 0))
+            .collect())
     }
 }

@@ -23,14 +23,31 @@ enum Root {
     /// Registers: the scalars of the whole variable, and where the pointee starts.
     Variables { all: Rc<[Variable]>, start: usize },
     /// Slots of each class; the computed parts are of each class, too.
-    Memory { memory: Memory, slots: Slots, computed: Option<(Value, Value)> },
+    Memory {
+        memory: Memory,
+        slots: Slots,
+        computed: Option<(Value, Value)>,
+    },
     /// Bytes of a buffer; the computed part is in words.
-    Buffer { buffer: u16, offset: u32, computed: Option<Value>, constant: bool },
+    Buffer {
+        buffer: u16,
+        offset: u32,
+        computed: Option<Value>,
+        constant: bool,
+    },
 }
 
 impl Place {
     pub(super) fn buffer(ty: TypeInner, buffer: u16, constant: bool) -> Self {
-        Self { ty, root: Root::Buffer { buffer, offset: 0, computed: None, constant } }
+        Self {
+            ty,
+            root: Root::Buffer {
+                buffer,
+                offset: 0,
+                computed: None,
+                constant,
+            },
+        }
     }
 
     pub(super) fn variables(&self) -> Vec<Variable> {
@@ -48,8 +65,14 @@ impl Translator<'_> {
             return self.memory_place(ty, Memory::Private);
         }
         let leaves = self.leaves(&ty)?;
-        let all = leaves.into_iter().map(|leaf| self.builder.new_variable(leaf.class())).collect();
-        Ok(Place { ty, root: Root::Variables { all, start: 0 } })
+        let all = leaves
+            .into_iter()
+            .map(|leaf| self.builder.new_variable(leaf.class()))
+            .collect();
+        Ok(Place {
+            ty,
+            root: Root::Variables { all, start: 0 },
+        })
     }
 
     /// Room for a variable of a workgroup.
@@ -69,16 +92,29 @@ impl Translator<'_> {
         total.int += size.int;
         let most = total.float.max(total.int);
         if most > MAX_SLOTS {
-            return Err(Fail::TooLarge { what, size: most.into(), limit: MAX_SLOTS.into() });
+            return Err(Fail::TooLarge {
+                what,
+                size: most.into(),
+                limit: MAX_SLOTS.into(),
+            });
         }
-        Ok(Place { ty, root: Root::Memory { memory, slots, computed: None } })
+        Ok(Place {
+            ty,
+            root: Root::Memory {
+                memory,
+                slots,
+                computed: None,
+            },
+        })
     }
 
     /// The component `index` of what `place` points at.
     pub(super) fn member(&mut self, place: &Place, index: u32) -> Result<Place, Fail> {
         let (ty, byte, before) = match &place.ty {
             TypeInner::Struct { members, .. } => {
-                let member = members.get(index as usize).ok_or_else(|| Fail::invalid("a member index is out of range"))?;
+                let member = members
+                    .get(index as usize)
+                    .ok_or_else(|| Fail::invalid("a member index is out of range"))?;
                 let mut before = Slots::default();
                 for member in &members[..index as usize] {
                     let slots = self.slots(self.inner(member.ty))?;
@@ -95,7 +131,11 @@ impl Translator<'_> {
                     float: slots.float.checked_mul(index).ok_or_else(overflow)?,
                     int: slots.int.checked_mul(index).ok_or_else(overflow)?,
                 };
-                (element, stride.checked_mul(index).ok_or_else(overflow)?, before)
+                (
+                    element,
+                    stride.checked_mul(index).ok_or_else(overflow)?,
+                    before,
+                )
             }
         };
         let mut root = place.root.clone();
@@ -129,12 +169,22 @@ impl Translator<'_> {
         let (element, stride) = self.element(&place.ty)?;
         let mut root = place.root.clone();
         match &mut root {
-            Root::Variables { .. } => return Err(Fail::invalid("a variable in registers is indexed by a computed value")),
+            Root::Variables { .. } => {
+                return Err(Fail::invalid(
+                    "a variable in registers is indexed by a computed value",
+                ));
+            }
             Root::Memory { computed, .. } => {
                 let slots = self.slots(&element)?;
-                let (float, int) = (self.scaled(index, slots.float), self.scaled(index, slots.int));
+                let (float, int) = (
+                    self.scaled(index, slots.float),
+                    self.scaled(index, slots.int),
+                );
                 *computed = Some(match *computed {
-                    Some((f, i)) => (self.builder.arith(Arith::AddI, &[f, float]), self.builder.arith(Arith::AddI, &[i, int])),
+                    Some((f, i)) => (
+                        self.builder.arith(Arith::AddI, &[f, float]),
+                        self.builder.arith(Arith::AddI, &[i, int]),
+                    ),
                     None => (float, int),
                 });
             }
@@ -158,9 +208,14 @@ impl Translator<'_> {
     fn element(&self, ty: &TypeInner) -> Result<(TypeInner, u32), Fail> {
         match *ty {
             TypeInner::Vector { scalar, .. } => Ok((TypeInner::Scalar(scalar), 4)),
-            TypeInner::Matrix { rows, scalar, .. } => Ok((TypeInner::Vector { size: rows, scalar }, column_stride(rows))),
+            TypeInner::Matrix { rows, scalar, .. } => Ok((
+                TypeInner::Vector { size: rows, scalar },
+                column_stride(rows),
+            )),
             TypeInner::Array { base, stride, .. } => Ok((self.inner(base).clone(), stride)),
-            _ => Err(Fail::invalid("something other than a vector, matrix, array or struct is indexed")),
+            _ => Err(Fail::invalid(
+                "something other than a vector, matrix, array or struct is indexed",
+            )),
         }
     }
 
@@ -169,7 +224,10 @@ impl Translator<'_> {
         Ok(match *ty {
             TypeInner::Vector { size, .. } => Some(size as u32),
             TypeInner::Matrix { columns, .. } => Some(columns as u32),
-            TypeInner::Array { size: naga::ArraySize::Dynamic, .. } => None,
+            TypeInner::Array {
+                size: naga::ArraySize::Dynamic,
+                ..
+            } => None,
             TypeInner::Array { size, .. } => Some(fixed_length(size)?),
             _ => return Err(Fail::invalid("something without elements is indexed")),
         })
@@ -178,10 +236,30 @@ impl Translator<'_> {
     /// `arrayLength`.
     pub(super) fn runtime_length(&mut self, place: &Place) -> Result<Value, Fail> {
         match (&place.ty, &place.root) {
-            (&TypeInner::Array { size: naga::ArraySize::Dynamic, stride, .. }, &Root::Buffer { buffer, offset, computed: None, .. }) => {
-                Ok(self.builder.op(Op::BufferLength { buffer, offset, stride }, &[], &[Class::Int])[0])
-            }
-            _ => Err(Fail::invalid("the length of something other than a runtime-sized array is taken")),
+            (
+                &TypeInner::Array {
+                    size: naga::ArraySize::Dynamic,
+                    stride,
+                    ..
+                },
+                &Root::Buffer {
+                    buffer,
+                    offset,
+                    computed: None,
+                    ..
+                },
+            ) => Ok(self.builder.op(
+                Op::BufferLength {
+                    buffer,
+                    offset,
+                    stride,
+                },
+                &[],
+                &[Class::Int],
+            )[0]),
+            _ => Err(Fail::invalid(
+                "the length of something other than a runtime-sized array is taken",
+            )),
         }
     }
 
@@ -193,16 +271,40 @@ impl Translator<'_> {
             let class = leaf.class();
             let value = match &place.root {
                 Root::Variables { all, start } => {
-                    let variable = *all.get(start + i).ok_or_else(|| Fail::invalid("a pointer leaves its variable"))?;
+                    let variable = *all
+                        .get(start + i)
+                        .ok_or_else(|| Fail::invalid("a pointer leaves its variable"))?;
                     self.builder.get(variable)
                 }
                 Root::Memory { .. } => {
                     let (memory, slot, index) = slot_of(&place.root, class, &mut slots)?;
-                    self.builder.op(Op::MemoryLoad { memory, slot, class }, index.as_slice(), &[class])[0]
+                    self.builder.op(
+                        Op::MemoryLoad {
+                            memory,
+                            slot,
+                            class,
+                        },
+                        index.as_slice(),
+                        &[class],
+                    )[0]
                 }
-                &Root::Buffer { buffer, offset, computed, constant } => {
+                &Root::Buffer {
+                    buffer,
+                    offset,
+                    computed,
+                    constant,
+                } => {
                     let offset = offset.saturating_add(leaf.offset) / 4;
-                    self.builder.op(Op::BufferLoad { buffer, offset, class, constant }, computed.as_slice(), &[class])[0]
+                    self.builder.op(
+                        Op::BufferLoad {
+                            buffer,
+                            offset,
+                            class,
+                            constant,
+                        },
+                        computed.as_slice(),
+                        &[class],
+                    )[0]
                 }
             };
             values.push(value);
@@ -220,18 +322,41 @@ impl Translator<'_> {
             let class = leaf.class();
             match &place.root {
                 Root::Variables { all, start } => {
-                    let variable = *all.get(start + i).ok_or_else(|| Fail::invalid("a pointer leaves its variable"))?;
+                    let variable = *all
+                        .get(start + i)
+                        .ok_or_else(|| Fail::invalid("a pointer leaves its variable"))?;
                     self.builder.set(variable, value);
                 }
                 Root::Memory { .. } => {
                     let (memory, slot, index) = slot_of(&place.root, class, &mut slots)?;
                     let operands: Vec<Value> = [value].into_iter().chain(index).collect();
-                    self.builder.op(Op::MemoryStore { memory, slot, class }, &operands, &[]);
+                    self.builder.op(
+                        Op::MemoryStore {
+                            memory,
+                            slot,
+                            class,
+                        },
+                        &operands,
+                        &[],
+                    );
                 }
-                &Root::Buffer { buffer, offset, computed, .. } => {
+                &Root::Buffer {
+                    buffer,
+                    offset,
+                    computed,
+                    ..
+                } => {
                     let offset = offset.saturating_add(leaf.offset) / 4;
                     let operands: Vec<Value> = [value].into_iter().chain(computed).collect();
-                    self.builder.op(Op::BufferStore { buffer, offset, class }, &operands, &[]);
+                    self.builder.op(
+                        Op::BufferStore {
+                            buffer,
+                            offset,
+                            class,
+                        },
+                        &operands,
+                        &[],
+                    );
                 }
             }
         }
@@ -239,17 +364,46 @@ impl Translator<'_> {
     }
 
     /// A read-modify-write; returns the old value.
-    pub(super) fn atomic(&mut self, place: &Place, function: AtomicFunction, values: &[Value]) -> Result<Value, Fail> {
-        if values.iter().any(|&value| self.builder.class(value) != Class::Int) {
-            return Err(Fail::unsupported("atomic operations on floating-point numbers"));
+    pub(super) fn atomic(
+        &mut self,
+        place: &Place,
+        function: AtomicFunction,
+        values: &[Value],
+    ) -> Result<Value, Fail> {
+        if values
+            .iter()
+            .any(|&value| self.builder.class(value) != Class::Int)
+        {
+            return Err(Fail::unsupported(
+                "atomic operations on floating-point numbers",
+            ));
         }
         let (op, index) = match &place.root {
-            &Root::Buffer { buffer, offset, computed, .. } => (Op::BufferAtomic { buffer, offset: offset / 4, function }, computed),
-            root @ Root::Memory { memory: Memory::Workgroup, .. } => {
+            &Root::Buffer {
+                buffer,
+                offset,
+                computed,
+                ..
+            } => (
+                Op::BufferAtomic {
+                    buffer,
+                    offset: offset / 4,
+                    function,
+                },
+                computed,
+            ),
+            root @ Root::Memory {
+                memory: Memory::Workgroup,
+                ..
+            } => {
                 let (_, slot, index) = slot_of(root, Class::Int, &mut Slots::default())?;
                 (Op::WorkgroupAtomic { slot, function }, index)
             }
-            _ => return Err(Fail::invalid("an atomic operation is on neither storage nor workgroup memory")),
+            _ => {
+                return Err(Fail::invalid(
+                    "an atomic operation is on neither storage nor workgroup memory",
+                ));
+            }
         };
         let operands: Vec<Value> = values.iter().copied().chain(index).collect();
         Ok(self.builder.op(op, &operands, &[Class::Int])[0])
@@ -257,9 +411,20 @@ impl Translator<'_> {
 }
 
 /// Where the next scalar of `class` lies; `taken` counts the ones before.
-fn slot_of(root: &Root, class: Class, taken: &mut Slots) -> Result<(Memory, u32, Option<Value>), Fail> {
-    let Root::Memory { memory, slots, computed } = root else {
-        return Err(Fail::invalid("memory slots of a variable that is not in memory"));
+fn slot_of(
+    root: &Root,
+    class: Class,
+    taken: &mut Slots,
+) -> Result<(Memory, u32, Option<Value>), Fail> {
+    let Root::Memory {
+        memory,
+        slots,
+        computed,
+    } = root
+    else {
+        return Err(Fail::invalid(
+            "memory slots of a variable that is not in memory",
+        ));
     };
     let (first, taken, index) = match class {
         Class::Float => (slots.float, &mut taken.float, computed.map(|c| c.0)),

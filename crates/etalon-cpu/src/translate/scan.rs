@@ -17,7 +17,9 @@ pub(super) enum Root {
 pub(super) fn root(function: &Function, mut expression: Handle<Expression>) -> Root {
     loop {
         match function.expressions[expression] {
-            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => expression = base,
+            Expression::Access { base, .. } | Expression::AccessIndex { base, .. } => {
+                expression = base
+            }
             Expression::LocalVariable(local) => return Root::Local(local),
             Expression::GlobalVariable(global) => return Root::Global(global),
             Expression::FunctionArgument(index) => return Root::Argument(index),
@@ -40,7 +42,16 @@ pub(super) fn indexed(module: &Module) -> Indexed {
     // A function comes after those it calls.
     for (handle, function) in module.functions.iter() {
         let roots = indexed.roots(function);
-        let arguments = roots.iter().filter_map(|root| if let Root::Argument(i) = root { Some(*i) } else { None }).collect();
+        let arguments = roots
+            .iter()
+            .filter_map(|root| {
+                if let Root::Argument(i) = root {
+                    Some(*i)
+                } else {
+                    None
+                }
+            })
+            .collect();
         indexed.arguments.insert(handle, arguments);
         indexed.add_globals(&roots);
     }
@@ -53,12 +64,27 @@ pub(super) fn indexed(module: &Module) -> Indexed {
 
 impl Indexed {
     fn add_globals(&mut self, roots: &HashSet<Root>) {
-        self.globals.extend(roots.iter().filter_map(|root| if let Root::Global(g) = root { Some(*g) } else { None }));
+        self.globals.extend(roots.iter().filter_map(|root| {
+            if let Root::Global(g) = root {
+                Some(*g)
+            } else {
+                None
+            }
+        }));
     }
 
     /// The local variables of `function` that are indexed.
     pub(super) fn locals(&self, function: &Function) -> HashSet<Handle<LocalVariable>> {
-        self.roots(function).iter().filter_map(|root| if let Root::Local(l) = root { Some(*l) } else { None }).collect()
+        self.roots(function)
+            .iter()
+            .filter_map(|root| {
+                if let Root::Local(l) = root {
+                    Some(*l)
+                } else {
+                    None
+                }
+            })
+            .collect()
     }
 
     fn roots(&self, function: &Function) -> HashSet<Root> {
@@ -77,7 +103,11 @@ impl Indexed {
     /// Variables whose address goes to a function that indexes it.
     fn passed_on(&self, function: &Function, block: &Block, roots: &mut HashSet<Root>) {
         for_each(block, &mut |statement| {
-            if let Statement::Call { function: callee, arguments, .. } = statement
+            if let Statement::Call {
+                function: callee,
+                arguments,
+                ..
+            } = statement
                 && let Some(indexed) = self.arguments.get(callee)
             {
                 for &index in indexed {
@@ -115,8 +145,12 @@ fn for_each(block: &Block, visit: &mut impl FnMut(&Statement)) {
                 for_each(accept, visit);
                 for_each(reject, visit);
             }
-            Statement::Switch { cases, .. } => cases.iter().for_each(|case| for_each(&case.body, visit)),
-            Statement::Loop { body, continuing, .. } => {
+            Statement::Switch { cases, .. } => {
+                cases.iter().for_each(|case| for_each(&case.body, visit))
+            }
+            Statement::Loop {
+                body, continuing, ..
+            } => {
                 for_each(body, visit);
                 for_each(continuing, visit);
             }

@@ -21,7 +21,10 @@ pub(super) struct Sequence<'a> {
 
 impl<'a> Sequence<'a> {
     pub(super) fn of(block: &'a Block) -> Self {
-        Self { parts: vec![(block, 0)], absorbed: 0 }
+        Self {
+            parts: vec![(block, 0)],
+            absorbed: 0,
+        }
     }
 
     fn next(&mut self) -> Option<(&'a Statement, Span)> {
@@ -36,30 +39,52 @@ impl<'a> Sequence<'a> {
     }
 
     fn is_empty(&self) -> bool {
-        self.parts.iter().all(|(block, position)| *position >= block.len())
+        self.parts
+            .iter()
+            .all(|(block, position)| *position >= block.len())
     }
 
     /// The statements of `block`, then those of `self`.
     fn after(&self, block: &'a Block) -> Self {
-        let parts = [(block, 0)].into_iter().chain(self.parts.iter().copied()).collect();
-        Self { parts, absorbed: self.absorbed + 1 }
+        let parts = [(block, 0)]
+            .into_iter()
+            .chain(self.parts.iter().copied())
+            .collect();
+        Self {
+            parts,
+            absorbed: self.absorbed + 1,
+        }
     }
 }
 
 impl<'a> Translator<'a> {
     /// Translates statements. Leaving any scope of `tails` from their end is
     /// what happens anyway. Says whether their end can be reached.
-    pub(super) fn block(&mut self, frame: &mut Frame<'a>, mut sequence: Sequence<'a>, tails: &[ScopeId]) -> Result<bool, Fail> {
+    pub(super) fn block(
+        &mut self,
+        frame: &mut Frame<'a>,
+        mut sequence: Sequence<'a>,
+        tails: &[ScopeId],
+    ) -> Result<bool, Fail> {
         while let Some((statement, span)) = sequence.next() {
             self.builder.span = span;
             self.builder.check_size()?;
             let here: &[ScopeId] = if sequence.is_empty() { tails } else { &[] };
-            let falls_through = if let Statement::If { condition, accept, reject } = statement {
+            let falls_through = if let Statement::If {
+                condition,
+                accept,
+                reject,
+            } = statement
+            {
                 let condition = self.scalar(frame, *condition)?;
                 // `if c { return x; } rest` is `if c { return x; } else { rest }`,
                 // in which no lanes need be remembered as having returned.
-                let skips = |block: &Block| target(frame, block).is_some_and(|scope| tails.contains(&scope));
-                let absorb = !sequence.is_empty() && sequence.absorbed < MAX_ABSORBED && skips(accept) != skips(reject);
+                let skips = |block: &Block| {
+                    target(frame, block).is_some_and(|scope| tails.contains(&scope))
+                };
+                let absorb = !sequence.is_empty()
+                    && sequence.absorbed < MAX_ABSORBED
+                    && skips(accept) != skips(reject);
                 if absorb {
                     let (yes, no) = if skips(accept) {
                         (Sequence::of(accept), sequence.after(reject))
@@ -68,7 +93,13 @@ impl<'a> Translator<'a> {
                     };
                     return self.if_else(frame, condition, yes, no, tails);
                 }
-                self.if_else(frame, condition, Sequence::of(accept), Sequence::of(reject), here)?
+                self.if_else(
+                    frame,
+                    condition,
+                    Sequence::of(accept),
+                    Sequence::of(reject),
+                    here,
+                )?
             } else {
                 self.statement(frame, statement, here)?
             };
@@ -79,7 +110,14 @@ impl<'a> Translator<'a> {
         Ok(true)
     }
 
-    fn if_else(&mut self, frame: &mut Frame<'a>, condition: Value, accept: Sequence<'a>, reject: Sequence<'a>, tails: &[ScopeId]) -> Result<bool, Fail> {
+    fn if_else(
+        &mut self,
+        frame: &mut Frame<'a>,
+        condition: Value,
+        accept: Sequence<'a>,
+        reject: Sequence<'a>,
+        tails: &[ScopeId],
+    ) -> Result<bool, Fail> {
         if let Some(bits) = self.builder.constant_bits(condition) {
             return self.block(frame, if bits == FALSE { reject } else { accept }, tails);
         }
@@ -94,7 +132,12 @@ impl<'a> Translator<'a> {
         Ok(self.builder.finish_if(condition, &before, accept, reject))
     }
 
-    fn statement(&mut self, frame: &mut Frame<'a>, statement: &'a Statement, tails: &[ScopeId]) -> Result<bool, Fail> {
+    fn statement(
+        &mut self,
+        frame: &mut Frame<'a>,
+        statement: &'a Statement,
+        tails: &[ScopeId],
+    ) -> Result<bool, Fail> {
         match statement {
             Statement::Emit(range) => {
                 for expression in range.clone() {
@@ -103,21 +146,35 @@ impl<'a> Translator<'a> {
             }
             Statement::Block(block) => return self.block(frame, Sequence::of(block), tails),
             Statement::If { .. } => return Err(Fail::invalid("a branch outside of a block")),
-            Statement::Switch { selector, cases } => return self.switch(frame, *selector, cases, tails),
-            Statement::Loop { body, continuing, break_if } => return self.looped(frame, body, continuing, *break_if),
+            Statement::Switch { selector, cases } => {
+                return self.switch(frame, *selector, cases, tails);
+            }
+            Statement::Loop {
+                body,
+                continuing,
+                break_if,
+            } => return self.looped(frame, body, continuing, *break_if),
             Statement::Break => {
-                let scope = *frame.breaks.last().ok_or_else(|| Fail::invalid("`break` outside of a loop or switch"))?;
+                let scope = *frame
+                    .breaks
+                    .last()
+                    .ok_or_else(|| Fail::invalid("`break` outside of a loop or switch"))?;
                 return Ok(self.leave(scope, tails));
             }
             Statement::Continue => {
-                let scope = *frame.continues.last().ok_or_else(|| Fail::invalid("`continue` outside of a loop"))?;
+                let scope = *frame
+                    .continues
+                    .last()
+                    .ok_or_else(|| Fail::invalid("`continue` outside of a loop"))?;
                 return Ok(self.leave(scope, tails));
             }
             Statement::Return { value } => {
                 if let Some(value) = value {
                     let values = self.scalars(frame, *value)?;
                     for (i, value) in values.into_iter().enumerate() {
-                        let variable = *frame.result.get(i).ok_or_else(|| Fail::invalid("a returned value is not of the function's type"))?;
+                        let variable = *frame.result.get(i).ok_or_else(|| {
+                            Fail::invalid("a returned value is not of the function's type")
+                        })?;
                         self.builder.set(variable, value);
                     }
                 }
@@ -128,7 +185,12 @@ impl<'a> Translator<'a> {
                 let values = self.scalars(frame, *value)?;
                 self.store(&place, &values)?;
             }
-            Statement::ImageStore { image, coordinate, array_index, value } => self.image_store(frame, *image, *coordinate, *array_index, *value)?,
+            Statement::ImageStore {
+                image,
+                coordinate,
+                array_index,
+                value,
+            } => self.image_store(frame, *image, *coordinate, *array_index, *value)?,
             Statement::ControlBarrier(_) => self.builder.barrier(),
             // Lanes run in lockstep, so memory is always up to date.
             Statement::MemoryBarrier(_) => {}
@@ -139,15 +201,32 @@ impl<'a> Translator<'a> {
                 self.builder.barrier();
                 frame.operands.insert(*result, Operand::Scalars(values));
             }
-            Statement::Atomic { pointer, fun, value, result } => self.atomic_statement(frame, *pointer, fun, *value, *result)?,
-            Statement::Call { function, arguments, result } => self.call(frame, *function, arguments, *result)?,
+            Statement::Atomic {
+                pointer,
+                fun,
+                value,
+                result,
+            } => self.atomic_statement(frame, *pointer, fun, *value, *result)?,
+            Statement::Call {
+                function,
+                arguments,
+                result,
+            } => self.call(frame, *function, arguments, *result)?,
             Statement::Kill => return Err(Fail::unsupported("`discard`")),
-            Statement::ImageAtomic { .. } => return Err(Fail::unsupported("atomic operations on textures")),
-            Statement::RayQuery { .. } | Statement::RayPipelineFunction(_) => return Err(Fail::unsupported("ray tracing")),
-            Statement::SubgroupBallot { .. } | Statement::SubgroupGather { .. } | Statement::SubgroupCollectiveOperation { .. } => {
+            Statement::ImageAtomic { .. } => {
+                return Err(Fail::unsupported("atomic operations on textures"));
+            }
+            Statement::RayQuery { .. } | Statement::RayPipelineFunction(_) => {
+                return Err(Fail::unsupported("ray tracing"));
+            }
+            Statement::SubgroupBallot { .. }
+            | Statement::SubgroupGather { .. }
+            | Statement::SubgroupCollectiveOperation { .. } => {
                 return Err(Fail::unsupported("subgroup operations"));
             }
-            Statement::CooperativeStore { .. } => return Err(Fail::unsupported("cooperative matrices")),
+            Statement::CooperativeStore { .. } => {
+                return Err(Fail::unsupported("cooperative matrices"));
+            }
         }
         Ok(true)
     }
@@ -161,7 +240,13 @@ impl<'a> Translator<'a> {
         false
     }
 
-    fn switch(&mut self, frame: &mut Frame<'a>, selector: Handle<Expression>, cases: &'a [SwitchCase], tails: &[ScopeId]) -> Result<bool, Fail> {
+    fn switch(
+        &mut self,
+        frame: &mut Frame<'a>,
+        selector: Handle<Expression>,
+        cases: &'a [SwitchCase],
+        tails: &[ScopeId],
+    ) -> Result<bool, Fail> {
         let selector = self.scalar(frame, selector)?;
         let scope = self.builder.new_scope();
         frame.breaks.push(scope);
@@ -180,7 +265,11 @@ impl<'a> Translator<'a> {
                 }
                 continue;
             }
-            groups.push((std::mem::take(&mut values), std::mem::take(&mut is_default), &case.body));
+            groups.push((
+                std::mem::take(&mut values),
+                std::mem::take(&mut is_default),
+                &case.body,
+            ));
         }
         // The default comes last wherever it is written.
         groups.sort_by_key(|group| group.1);
@@ -193,7 +282,13 @@ impl<'a> Translator<'a> {
         Ok(reached || self.builder.is_left(scope))
     }
 
-    fn cases(&mut self, frame: &mut Frame<'a>, selector: Value, groups: &[(Vec<u32>, bool, &'a Block)], tails: &[ScopeId]) -> Result<bool, Fail> {
+    fn cases(
+        &mut self,
+        frame: &mut Frame<'a>,
+        selector: Value,
+        groups: &[(Vec<u32>, bool, &'a Block)],
+        tails: &[ScopeId],
+    ) -> Result<bool, Fail> {
         let Some(((values, is_default, body), rest)) = groups.split_first() else {
             return Ok(true);
         };
@@ -222,7 +317,13 @@ impl<'a> Translator<'a> {
         Ok(self.builder.finish_if(condition, &before, accept, reject))
     }
 
-    fn looped(&mut self, frame: &mut Frame<'a>, body: &'a Block, continuing: &'a Block, break_if: Option<Handle<Expression>>) -> Result<bool, Fail> {
+    fn looped(
+        &mut self,
+        frame: &mut Frame<'a>,
+        body: &'a Block,
+        continuing: &'a Block,
+        break_if: Option<Handle<Expression>>,
+    ) -> Result<bool, Fail> {
         let span = self.builder.span;
         let (id, next) = (self.builder.new_scope(), self.builder.new_scope());
         let changing = self.changing(frame, &[body, continuing]);
@@ -238,10 +339,13 @@ impl<'a> Translator<'a> {
         self.builder.after_body(next, &body);
         // `break` is not allowed here.
         let reached = self.block(frame, Sequence::of(continuing), &[])?;
-        let break_if = break_if.map(|condition| self.scalar(frame, condition)).transpose()?;
+        let break_if = break_if
+            .map(|condition| self.scalar(frame, condition))
+            .transpose()?;
         let continuing = self.builder.end(reached);
         self.builder.span = span;
-        self.builder.finish_loop(id, next, body, continuing, break_if);
+        self.builder
+            .finish_loop(id, next, body, continuing, break_if);
         Ok(true)
     }
 
@@ -255,7 +359,13 @@ impl<'a> Translator<'a> {
         let mut variables = Vec::new();
         for root in roots {
             match root {
-                Root::Local(local) => variables.extend(frame.locals.get(&local).map(super::Place::variables).unwrap_or_default()),
+                Root::Local(local) => variables.extend(
+                    frame
+                        .locals
+                        .get(&local)
+                        .map(super::Place::variables)
+                        .unwrap_or_default(),
+                ),
                 Root::Argument(index) => {
                     if let Some(Operand::Place(place)) = frame.arguments.get(index as usize) {
                         variables.extend(place.variables());
@@ -275,25 +385,50 @@ impl<'a> Translator<'a> {
         variables
     }
 
-    fn call(&mut self, frame: &mut Frame<'a>, function: Handle<Function>, arguments: &[Handle<Expression>], result: Option<Handle<Expression>>) -> Result<(), Fail> {
+    fn call(
+        &mut self,
+        frame: &mut Frame<'a>,
+        function: Handle<Function>,
+        arguments: &[Handle<Expression>],
+        result: Option<Handle<Expression>>,
+    ) -> Result<(), Fail> {
         let span = self.builder.span;
-        let arguments = arguments.iter().map(|&argument| self.operand(frame, argument)).collect::<Result<Vec<_>, _>>()?;
+        let arguments = arguments
+            .iter()
+            .map(|&argument| self.operand(frame, argument))
+            .collect::<Result<Vec<_>, _>>()?;
         let scope = self.builder.new_scope();
         self.builder.begin();
         let body = &self.module.functions[function].body;
-        let mut callee = self.frame(&self.module.functions[function], &self.info[function], arguments, scope)?;
+        let mut callee = self.frame(
+            &self.module.functions[function],
+            &self.info[function],
+            arguments,
+            scope,
+        )?;
         let reached = self.block(&mut callee, Sequence::of(body), &[scope])?;
         let body = self.builder.end(reached);
         self.builder.span = span;
         self.builder.finish_scope(scope, body);
         if let Some(result) = result {
-            let values = callee.result.iter().map(|&variable| self.builder.get(variable)).collect();
+            let values = callee
+                .result
+                .iter()
+                .map(|&variable| self.builder.get(variable))
+                .collect();
             frame.operands.insert(result, Operand::Scalars(values));
         }
         Ok(())
     }
 
-    fn atomic_statement(&mut self, frame: &mut Frame<'a>, pointer: Handle<Expression>, function: &naga::AtomicFunction, value: Handle<Expression>, result: Option<Handle<Expression>>) -> Result<(), Fail> {
+    fn atomic_statement(
+        &mut self,
+        frame: &mut Frame<'a>,
+        pointer: Handle<Expression>,
+        function: &naga::AtomicFunction,
+        value: Handle<Expression>,
+        result: Option<Handle<Expression>>,
+    ) -> Result<(), Fail> {
         use naga::AtomicFunction as A;
         let place = self.place(frame, pointer)?;
         let signed = self.kind(frame, value)? == naga::ScalarKind::Sint;
@@ -310,7 +445,9 @@ impl<'a> Translator<'a> {
             A::Max if signed => AtomicFunction::MaxS,
             A::Max => AtomicFunction::MaxU,
             A::Exchange { compare: None } => AtomicFunction::Exchange,
-            A::Exchange { compare: Some(compare) } => {
+            A::Exchange {
+                compare: Some(compare),
+            } => {
                 let expected = self.scalar(frame, compare)?;
                 values.insert(0, expected);
                 compared = Some(expected);

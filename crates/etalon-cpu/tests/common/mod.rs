@@ -8,10 +8,14 @@ use etalon_cpu::{BoundResource, Buffer, Executor, Program, Texture, Tier, Transl
 
 /// Parses, validates and translates; the entry point is `main`.
 pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
-    let module = naga::front::wgsl::parse_str(wgsl).unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
-    let info = naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::all())
-        .validate(&module)
+    let module = naga::front::wgsl::parse_str(wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
+    let info = naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::all(),
+    )
+    .validate(&module)
+    .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
     Program::from_module("test", wgsl, &module, &info, "main")
 }
 
@@ -24,15 +28,26 @@ pub(crate) fn executors() -> Vec<(String, Executor)> {
     let mut all = Vec::new();
     for tier in Tier::ALL.into_iter().filter(|tier| tier.is_available()) {
         for (threads, lanes) in [(1, 64), (3, 64), (2, 256)] {
-            let executor = Executor::new(threads).unwrap().with_tier(tier).with_lanes(lanes);
-            all.push((format!("{tier}, {threads} threads, {lanes} lanes"), executor));
+            let executor = Executor::new(threads)
+                .unwrap()
+                .with_tier(tier)
+                .with_lanes(lanes);
+            all.push((
+                format!("{tier}, {threads} threads, {lanes} lanes"),
+                executor,
+            ));
         }
     }
     all
 }
 
 pub(crate) fn words(buffer: &Buffer) -> Vec<u32> {
-    buffer.to_bytes().unwrap().chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    buffer
+        .to_bytes()
+        .unwrap()
+        .chunks_exact(4)
+        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]))
+        .collect()
 }
 
 pub(crate) fn buffer(words: &[u32]) -> Buffer {
@@ -41,7 +56,12 @@ pub(crate) fn buffer(words: &[u32]) -> Buffer {
 }
 
 pub(crate) fn floats(values: &[f32]) -> Buffer {
-    buffer(&values.iter().map(|value| value.to_bits()).collect::<Vec<_>>())
+    buffer(
+        &values
+            .iter()
+            .map(|value| value.to_bits())
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// Runs a kernel with storage buffers `data` (binding 0) and `result`
@@ -55,9 +75,17 @@ pub(crate) fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: 
         let bound: Vec<BoundResource<'_>> = program
             .bindings()
             .iter()
-            .map(|binding| BoundResource::Buffer(if binding.binding == 0 { &input } else { &output }))
+            .map(|binding| {
+                BoundResource::Buffer(if binding.binding == 0 {
+                    &input
+                } else {
+                    &output
+                })
+            })
             .collect();
-        program.dispatch(&executor, [workgroups, 1, 1], &bound).unwrap_or_else(|error| panic!("{error}\n{program}"));
+        program
+            .dispatch(&executor, [workgroups, 1, 1], &bound)
+            .unwrap_or_else(|error| panic!("{error}\n{program}"));
         let got = words(&output);
         match &first {
             None => first = Some(got),
@@ -65,7 +93,10 @@ pub(crate) fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: 
                 for (i, (a, b)) in first.iter().zip(&got).enumerate() {
                     // The payload of a NaN is nobody's promise.
                     let nans = f32::from_bits(*a).is_nan() && f32::from_bits(*b).is_nan();
-                    assert!(a == b || nans, "word {i} differs on {name}: {a:#x} and {b:#x}\n{program}");
+                    assert!(
+                        a == b || nans,
+                        "word {i} differs on {name}: {a:#x} and {b:#x}\n{program}"
+                    );
                 }
             }
         }
@@ -74,8 +105,16 @@ pub(crate) fn run_buffers(wgsl: &str, data: &[u32], results: usize, workgroups: 
 }
 
 /// An image whose texels are `f(x, y)`.
-pub(crate) fn image(width: u32, height: u32, format: Format, f: impl Fn(u32, u32) -> [f32; 4]) -> ImageData {
-    let texels: Vec<[f32; 4]> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| f(x, y)).collect();
+pub(crate) fn image(
+    width: u32,
+    height: u32,
+    format: Format,
+    f: impl Fn(u32, u32) -> [f32; 4],
+) -> ImageData {
+    let texels: Vec<[f32; 4]> = (0..height)
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| f(x, y))
+        .collect();
     ImageData::from_rgba_f32(TextureDesc::d2(width, height, format), &texels).unwrap()
 }
 

@@ -196,7 +196,7 @@ fn march_reference(
 fn march_is_exact() {
     let (width, height) = (53, 40);
     let value = |x: u32, y: u32| {
-        if (x * 7 + y * 3) % 11 == 0 {
+        if (x * 7 + y * 3).is_multiple_of(11) {
             0.0
         } else {
             1.0 + ((x * 13 + y * 29) % 17) as f32 * 0.05

@@ -4,7 +4,7 @@
 //! * [`kernel`]: WESL sources become validated, reflected naga modules.
 //! * [`plan`]: a graph becomes a list of steps with memory and barriers.
 //! * [`backend`]: what an executor of plans offers.
-//! * [`format`], [`texel`], [`resource`], [`image`]: texels and their shapes.
+//! * [`mod@format`], [`texel`], [`resource`], [`image`]: texels and their shapes.
 //!
 //! No GPU crate is among the dependencies: executors are crates of their own.
 

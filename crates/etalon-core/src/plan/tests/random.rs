@@ -458,10 +458,9 @@ fn check_first_tenants(plan: &Plan, touches: &HashMap<(u32, u32), Vec<Touch>>) {
         }
         let uses = (0..2).filter_map(|mip| touches.get(&(index as u32, mip)));
         for first in uses.filter_map(|uses| uses.first()) {
-            let barriers = plan.steps[first.step].barriers.iter();
+            let mut barriers = plan.steps[first.step].barriers.iter();
             let barrier = barriers
-                .filter(|barrier| barrier.resource == index as u32 && barrier.layout.is_none())
-                .last();
+                .rfind(|barrier| barrier.resource == index as u32 && barrier.layout.is_none());
             let from = barrier.map(|barrier| barrier.from);
             assert!(
                 from.is_some_and(|from| from.is_empty() || from == UsageSet::ALL),

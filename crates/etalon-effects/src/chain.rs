@@ -54,7 +54,7 @@ pub struct Chain {
     /// Linear light with reflections, before exposure; the scene's own colour
     /// where there are none.
     pub light: Texture,
-    /// `rg32float`, one texel: luminance adapted to and exposure.
+    /// `rgba32float`, one texel: luminance adapted to and exposure.
     pub adaptation: Option<Texture>,
     /// `rgba16float`, half size: exposed bloom.
     pub bloom: Option<Texture>,

@@ -5,6 +5,10 @@
 //! lets a history follow it and derives the factor that [`composite`] and
 //! [`bloom`] multiply the picture by.
 //!
+//! Both are kept in the first two channels of `rgba32float` textures, because
+//! OpenGL cannot store to two-channel ones; they are a 256th of the picture and
+//! smaller, so the other two channels cost next to nothing.
+//!
 //! [`composite`]: crate::composite
 //! [`bloom`]: crate::bloom
 
@@ -101,7 +105,7 @@ const TILE: u32 = 16;
 /// Sums the luminance of `colour`, or its logarithm to base 2, as
 /// `settings.metering` says.
 ///
-/// The result is one texel of `rg32float`: the sum, and the number of texels
+/// The result is one texel of `rgba32float`: the sum, and the number of texels
 /// that were finite and so took part.
 ///
 /// # Errors
@@ -119,7 +123,7 @@ pub fn measure(
         level += 1;
         graph.texture(
             format!("exposure.sums {level}"),
-            TextureDesc::d2(width, height, Format::Rg32Float),
+            TextureDesc::d2(width, height, Format::Rgba32Float),
         )
     };
     let result = tiles(graph, size);
@@ -147,7 +151,7 @@ pub fn measure(
 /// Meters `colour` and adapts to it.
 ///
 /// `delta_time` is the time since the last frame in seconds, in `[0, 1e6]`. The
-/// result is one texel of `rg32float`: the luminance adapted to, and the factor
+/// result is one texel of `rgba32float`: the luminance adapted to, and the factor
 /// that brings it to `key`. It is kept as the history [`HISTORY`].
 ///
 /// # Errors
@@ -163,7 +167,7 @@ pub fn exposure(
     // No luminance is 0, so the first frame's history is seen to be none.
     let history = graph.history(
         HISTORY,
-        TextureDesc::d2(1, 1, Format::Rg32Float),
+        TextureDesc::d2(1, 1, Format::Rgba32Float),
         ClearValue::Float([0.0; 4]),
     )?;
     Ok(graph

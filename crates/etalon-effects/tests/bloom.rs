@@ -287,7 +287,7 @@ fn exposure_counts_before_the_threshold() {
         [3.0, 1.5, 0.75, 1.0]
     );
     // An exposure texture multiplies on top.
-    let adaptation = image(Format::Rg32Float, 1, 1, |_, _| [1.0, 4.0, 0.0, 0.0]);
+    let adaptation = image(Format::Rgba32Float, 1, 1, |_, _| [1.0, 4.0, 0.0, 0.0]);
     let mut run = Run::new();
     let (source, adaptation) = (
         run.import("colour", &colour),

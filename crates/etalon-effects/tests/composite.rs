@@ -240,7 +240,7 @@ fn hdr_is_exposed_light_and_bloom() {
         [x as f32, y as f32, 0.125, 0.75]
     });
     let bloom = image(Format::Rgba16Float, 4, 3, |_, _| [2.0, 4.0, 8.0, 1.0]);
-    let adaptation = image(Format::Rg32Float, 1, 1, |_, _| [1.0, 0.5, 0.0, 0.0]);
+    let adaptation = image(Format::Rgba32Float, 1, 1, |_, _| [1.0, 0.5, 0.0, 0.0]);
     let mut run = Run::new();
     let (source, glow) = (run.import("colour", &colour), run.import("bloom", &bloom));
     let adaptation = run.import("adaptation", &adaptation);

@@ -286,7 +286,7 @@ fn compensation_is_in_stops() {
 
 #[test]
 fn a_poisoned_history_is_forgotten_in_one_frame() {
-    let sums = image(Format::Rg32Float, 1, 1, |_, _| [12.0, 6.0, 0.0, 0.0]);
+    let sums = image(Format::Rgba32Float, 1, 1, |_, _| [12.0, 6.0, 0.0, 0.0]);
     for poison in [
         f32::NAN,
         -f32::NAN,
@@ -298,7 +298,9 @@ fn a_poisoned_history_is_forgotten_in_one_frame() {
         f32::MAX,
         f32::MIN_POSITIVE,
     ] {
-        let history = image(Format::Rg32Float, 1, 1, |_, _| [poison, f32::NAN, 0.0, 0.0]);
+        let history = image(Format::Rgba32Float, 1, 1, |_, _| {
+            [poison, f32::NAN, 0.0, 0.0]
+        });
         let mut run = Run::new();
         let (measured, history) = (
             run.import("measured", &sums),
@@ -306,7 +308,7 @@ fn a_poisoned_history_is_forgotten_in_one_frame() {
         );
         let result = run
             .graph
-            .texture("result", TextureDesc::d2(1, 1, Format::Rg32Float));
+            .texture("result", TextureDesc::d2(1, 1, Format::Rgba32Float));
         let result = run
             .graph
             .compute("exposure/adapt")

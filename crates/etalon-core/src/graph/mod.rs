@@ -511,6 +511,10 @@ impl Graph {
     /// Asks for a texture: the passes it needs will run, and it can be fetched
     /// by `name` afterwards.
     ///
+    /// An import or a history can be asked for too. It stays what it is, so it
+    /// can be captured, but a backend gives an engine no texture for it; copy it
+    /// to one first if that is wanted.
+    ///
     /// # Errors
     /// If the name is taken by another output, or nothing has written the texture.
     pub fn output(&mut self, name: &str, texture: Texture) -> Result<(), GraphError> {

@@ -3,7 +3,7 @@
 use super::{R32, library, plan_with};
 use crate::graph::{Graph, GraphError, Texture, Written};
 use crate::plan::error::Mismatch;
-use crate::plan::{Capture, Plan, PlanError, PlanOptions, Step};
+use crate::plan::{Capture, Groups, Plan, PlanError, PlanOptions, Step, Usage};
 use crate::resource::{BufferDesc, Limits, SamplerDesc, TextureDesc};
 use crate::{Format, graph::ComputePass, kernel::KernelLibrary};
 
@@ -253,7 +253,7 @@ fn indirect_arguments_must_lie_inside_their_buffer() {
     assert!(matches!(
         good.steps[0].step,
         Step::Dispatch {
-            groups: crate::plan::Groups::Indirect { offset: 4, .. },
+            groups: Groups::Indirect { offset: 4, .. },
             ..
         }
     ));
@@ -301,4 +301,45 @@ fn what_only_another_variant_of_a_kernel_uses_may_be_given() {
         };
         Plan::new(&graph, &library, &options).unwrap();
     }
+}
+
+#[test]
+fn a_list_of_tiles_is_read_and_counts_its_own_workgroups() {
+    let mut library = library();
+    library.add_source(
+        "test/tiles",
+        "struct Tiles { groups: vec3<u32>, corners: array<u32> }
+         @group(0) @binding(0) var<storage, read> tiles: Tiles;
+         @group(0) @binding(1) var result: texture_storage_2d<r32float, write>;
+         @compute @workgroup_size(8, 8) fn main(@builtin(workgroup_id) tile: vec3<u32>) {
+             let corner = tiles.corners[tile.x];
+             textureStore(result, vec2<u32>(corner & 0xffffu, corner >> 16u), vec4f(1.0));
+         }",
+    );
+    let mut graph = Graph::new();
+    let tiles = graph
+        .import_buffer("tiles", BufferDesc { bytes: 64 })
+        .unwrap();
+    let target = graph.texture("target", R32);
+    let written = graph
+        .compute("test/tiles")
+        .write("result", target)
+        .per_tile("tiles", tiles)
+        .unwrap();
+    graph
+        .output("result", written.texture("result").unwrap())
+        .unwrap();
+    let plan = plan_with(&graph, &library, Capture::None).unwrap();
+    let Step::Dispatch { groups, .. } = &plan.steps[0].step else {
+        panic!("a dispatch")
+    };
+    let Groups::Indirect { buffer, offset } = *groups else {
+        panic!("{groups:?}")
+    };
+    let usages = plan.resources[buffer as usize].usages;
+    assert_eq!(offset, 0);
+    assert!(usages.contains(Usage::Indirect) && usages.contains(Usage::StorageRead));
+    // Both ways of reading wait for whoever wrote the list.
+    let mut waits = plan.steps[0].barriers.iter();
+    assert!(waits.any(|b| b.resource == buffer && b.to == Usage::Indirect));
 }

@@ -5,6 +5,7 @@
 pub mod compare;
 pub mod drivers;
 pub mod execute;
+pub mod measure;
 pub mod setup;
 pub mod size;
 pub mod test_backends;
@@ -24,6 +25,9 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Task {
     TestBackends(Box<test_backends::Options>),
+    /// Every kernel on the interpreter and on a Vulkan driver, side by side;
+    /// `--help` after it says more.
+    BenchKernels(measure::Forwarded),
     /// Run one job of test-backends.
     #[command(hide = true, name = test_backends::COMMAND)]
     Execute(execute::Job),
@@ -41,6 +45,9 @@ pub fn main() -> ExitCode {
                 Err(error) => Err(format!("this program cannot find itself: {error}")),
             };
             conclude(tested.map(|report| report.ok))
+        }
+        Task::BenchKernels(arguments) => {
+            conclude(measure::run("kernels", &arguments).map_err(|error| error.to_string()))
         }
         Task::Execute(job) => conclude(
             execute::run(&job)

@@ -218,13 +218,15 @@ impl<N: Number> Job<'_, N> {
 
     fn state(&self, chunks: usize, workgroups: [u32; 3]) -> Result<State<'_, N>, DispatchFailure> {
         let [vf, vi, uf, ui] = self.code.files.map(|size| size as usize);
+        let stride = vf.max(vi);
         let resources = &self.code.resources;
         let mut state = State {
             registers: Registers {
-                floats: allocate(vf.saturating_mul(chunks))?,
-                ints: allocate(vi.saturating_mul(chunks))?,
+                floats: allocate(stride.saturating_mul(chunks))?,
+                ints: allocate(stride.saturating_mul(chunks))?,
                 uniform_floats: allocate(uf)?,
                 uniform_ints: allocate(ui)?,
+                stride,
             },
             chunks,
             private_floats: allocate::<Lanes<N>>(
@@ -241,6 +243,7 @@ impl<N: Number> Job<'_, N> {
             first_chunk: 0,
             workgroup: [0; 3],
             workgroups,
+            any: false,
             failure: None,
             trips: vec![0; self.code.loops.len()],
         };

@@ -7,6 +7,7 @@ use super::{image, memory, sample};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::Op;
 use crate::num::Number;
+use crate::registers::LANES;
 
 /// The registers of a simple instruction, and where the whole one is found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,6 +25,8 @@ pub(super) struct Instr {
 #[derive(Debug)]
 pub(crate) struct Linked<N: Number> {
     calls: Vec<(Handler<N>, Instr)>,
+    /// Whether any lane of a mask is set.
+    any: Handler<N>,
 }
 
 impl<N: Number> Linked<N> {
@@ -49,7 +52,10 @@ impl<N: Number> Linked<N> {
                 (handler(inst, tier), instr)
             })
             .collect();
-        Self { calls }
+        Self {
+            calls,
+            any: Handler::new::<Any>(tier),
+        }
     }
 
     /// Runs the instructions that fill the uniform registers once per worker.
@@ -78,11 +84,17 @@ impl<N: Number> Linked<N> {
                     }
                 }
                 End::Any { mask, yes, no } => {
-                    if state.any(mask) {
-                        yes
+                    let some = if mask.varying {
+                        let test = Instr {
+                            a: mask.number,
+                            ..Instr::default()
+                        };
+                        self.any.call(state, &test);
+                        state.any
                     } else {
-                        no
-                    }
+                        state.registers.uniform_ints[usize::from(mask.number)] != 0
+                    };
+                    if some { yes } else { no }
                 }
                 End::Enter { counter, head } => {
                     state.trips[counter as usize] = 0;
@@ -137,6 +149,23 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::ImageSample { .. } => sample::sample(tier, varying_result),
         Op::ImageQuery { .. } => image::query(tier, varying_result),
         Op::Barrier => Handler::plain::<Barrier>(),
+    }
+}
+
+/// Whether any lane of a mask is set.
+struct Any;
+
+impl<N: Number> Step<N> for Any {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        let mut all = [0; LANES];
+        for chunk in 0..state.chunks {
+            let lanes = &state.registers.ints[state.at(instr.a, chunk)].0;
+            for k in 0..LANES {
+                all[k] |= lanes[k];
+            }
+        }
+        state.any = all.iter().fold(0, |all, lane| all | lane) != 0;
     }
 }
 

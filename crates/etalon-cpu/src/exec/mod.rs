@@ -11,6 +11,8 @@
 mod arith;
 mod dispatch;
 mod image;
+#[allow(unsafe_code)]
+mod lanes;
 mod link;
 mod memory;
 mod sample;

@@ -80,6 +80,8 @@ pub(crate) struct State<'a, N> {
     pub(crate) first_chunk: usize,
     pub(crate) workgroup: [u32; 3],
     pub(crate) workgroups: [u32; 3],
+    /// What [`super::link`]'s test of a mask found.
+    pub(crate) any: bool,
     pub(crate) failure: Option<Failure>,
     /// Trips of each loop since it was entered.
     pub(crate) trips: Vec<u32>,
@@ -95,7 +97,7 @@ impl<'a, N: Number> State<'a, N> {
     /// Where a chunk of a register of lanes is.
     #[inline(always)]
     pub(crate) fn at(&self, number: u16, chunk: usize) -> usize {
-        usize::from(number) * self.chunks + chunk
+        chunk * self.registers.stride + usize::from(number)
     }
 
     /// The integers of `K` lanes, or `K` times a uniform one.
@@ -168,17 +170,6 @@ impl<'a, N: Number> State<'a, N> {
             Some(mask) => self.ints(mask, chunk),
             None => [u32::MAX; LANES],
         }
-    }
-
-    /// Whether any lane of a mask is set.
-    pub(crate) fn any(&self, mask: Slot) -> bool {
-        if !mask.varying {
-            return self.registers.uniform_ints[usize::from(mask.number)] != 0;
-        }
-        let first = self.at(mask.number, 0);
-        self.registers.ints[first..first + self.chunks]
-            .iter()
-            .any(|lanes| lanes.0.iter().fold(0, |all, lane| all | lane) != 0)
     }
 }
 

@@ -1,0 +1,219 @@
+//! Registers as loops over lanes see them.
+//!
+//! Every loop works on blocks of lanes by value: a block of each operand is
+//! read, then a block of the result is written. So a result may be in the same
+//! register as an operand, and compilers see neither aliasing nor bounds: a
+//! loop becomes straight vector code. A block is small enough that functions of
+//! many steps keep theirs in vector registers.
+//!
+//! Registers are reached by address and not by index, since checking indices
+//! takes longer than a short instruction's work. What makes that sound is
+//! checked where programs are made and where the files are allocated: `Code`
+//! numbers registers below the sizes it states, and every worker's files have
+//! those sizes for each chunk of its batches.
+
+use super::state::State;
+use crate::num::Number;
+use crate::registers::{ClassOf, LANES, Lanes};
+
+/// Lanes that a loop handles together.
+const BLOCK: usize = 16;
+
+/// An operand of class `C` that loops over lanes read.
+pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
+    /// The register `number`, which the program has.
+    fn open(state: &mut State<'_, N>, number: u16) -> Self;
+
+    /// A block of lanes; `entry` is where the chunk's registers begin.
+    ///
+    /// # Safety
+    /// `entry` is a multiple of the files' stride below their end, and `lane` a
+    /// multiple of [`BLOCK`] below [`LANES`].
+    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK];
+}
+
+/// A register of lanes.
+#[derive(Clone, Copy)]
+pub(super) struct Varying<L>(*const Lanes<L>);
+
+impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
+    #[inline(always)]
+    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+        let file = C::file(&mut state.registers);
+        debug_assert!(usize::from(number) < file.len());
+        Self(file.as_ptr().wrapping_add(usize::from(number)))
+    }
+
+    #[inline(always)]
+    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK] {
+        // SAFETY: the register's number is below the stride (see the module's
+        // documentation), so the block is in the file, which is initialised.
+        unsafe {
+            let lanes = self.0.add(entry).cast::<C::Lane>().add(lane);
+            lanes.cast::<[C::Lane; BLOCK]>().read()
+        }
+    }
+}
+
+/// A register of one number.
+#[derive(Clone, Copy)]
+pub(super) struct Uniform<L>(L);
+
+impl<N: Number, C: ClassOf<N>> Source<N, C> for Uniform<C::Lane> {
+    #[inline(always)]
+    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+        let file = C::uniforms(&mut state.registers);
+        debug_assert!(usize::from(number) < file.len());
+        // SAFETY: `Code` states how many uniform registers it numbers, and the
+        // file has that many.
+        Self(unsafe { *file.get_unchecked(usize::from(number)) })
+    }
+
+    #[inline(always)]
+    unsafe fn block(self, _: usize, _: usize) -> [C::Lane; BLOCK] {
+        [self.0; BLOCK]
+    }
+}
+
+/// Runs `$body` for each block of the lanes of register `$number`, which it
+/// makes a value of from the block's place.
+macro_rules! blocks {
+    ($state:ident, $class:ty, $number:ident, |$entry:ident, $lane:ident, $old:ident| $body:expr) => {{
+        let (chunks, stride) = ($state.chunks, $state.registers.stride);
+        let file = <$class as ClassOf<N>>::file(&mut $state.registers);
+        debug_assert!(chunks * stride <= file.len() && usize::from($number) < stride);
+        let first = file.as_mut_ptr().wrapping_add(usize::from($number));
+        let (mut $entry, mut left) = (0, chunks);
+        while left > 0 {
+            let mut $lane = 0;
+            while $lane < LANES {
+                // SAFETY: as in `Varying::block`. Nothing else refers to the
+                // files: what the body reads, it reads by value.
+                unsafe {
+                    let $old = first
+                        .add($entry)
+                        .cast::<<$class as ClassOf<N>>::Lane>()
+                        .add($lane)
+                        .cast::<[<$class as ClassOf<N>>::Lane; BLOCK]>();
+                    let new = $body;
+                    $old.write(new);
+                }
+                $lane += BLOCK;
+            }
+            left -= 1;
+            if left > 0 {
+                // Opaque, or compilers make vectors of what several chunks have
+                // in the same lane, out of memory that is far apart.
+                $entry += std::hint::black_box(stride);
+            }
+        }
+    }};
+}
+
+/// `d = f(a)`, lane by lane.
+#[inline(always)]
+pub(super) fn map1<N, CA, CD, A>(
+    state: &mut State<'_, N>,
+    d: u16,
+    a: A,
+    f: impl Fn(CA::Lane) -> CD::Lane,
+) where
+    N: Number,
+    CA: ClassOf<N>,
+    CD: ClassOf<N>,
+    A: Source<N, CA>,
+{
+    blocks!(state, CD, d, |entry, lane, _old| {
+        let a = a.block(entry, lane);
+        let mut new = [CD::Lane::default(); BLOCK];
+        for k in 0..BLOCK {
+            new[k] = f(a[k]);
+        }
+        new
+    });
+}
+
+/// `d = f(a, b)`, lane by lane.
+#[inline(always)]
+pub(super) fn map2<N, CA, CB, CD, A, B>(
+    state: &mut State<'_, N>,
+    d: u16,
+    a: A,
+    b: B,
+    f: impl Fn(CA::Lane, CB::Lane) -> CD::Lane,
+) where
+    N: Number,
+    CA: ClassOf<N>,
+    CB: ClassOf<N>,
+    CD: ClassOf<N>,
+    A: Source<N, CA>,
+    B: Source<N, CB>,
+{
+    blocks!(state, CD, d, |entry, lane, _old| {
+        let (a, b) = (a.block(entry, lane), b.block(entry, lane));
+        let mut new = [CD::Lane::default(); BLOCK];
+        for k in 0..BLOCK {
+            new[k] = f(a[k], b[k]);
+        }
+        new
+    });
+}
+
+/// `d = f(a, b, c)`, lane by lane.
+#[inline(always)]
+pub(super) fn map3<N, CA, CB, CC, CD, A, B, C>(
+    state: &mut State<'_, N>,
+    d: u16,
+    a: A,
+    b: B,
+    c: C,
+    f: impl Fn(CA::Lane, CB::Lane, CC::Lane) -> CD::Lane,
+) where
+    N: Number,
+    CA: ClassOf<N>,
+    CB: ClassOf<N>,
+    CC: ClassOf<N>,
+    CD: ClassOf<N>,
+    A: Source<N, CA>,
+    B: Source<N, CB>,
+    C: Source<N, CC>,
+{
+    blocks!(state, CD, d, |entry, lane, _old| {
+        let (a, b, c) = (
+            a.block(entry, lane),
+            b.block(entry, lane),
+            c.block(entry, lane),
+        );
+        let mut new = [CD::Lane::default(); BLOCK];
+        for k in 0..BLOCK {
+            new[k] = f(a[k], b[k], c[k]);
+        }
+        new
+    });
+}
+
+/// `d = f(d, a, b)`, lane by lane.
+#[inline(always)]
+pub(super) fn update2<N, CA, CB, CD, A, B>(
+    state: &mut State<'_, N>,
+    d: u16,
+    a: A,
+    b: B,
+    f: impl Fn(CD::Lane, CA::Lane, CB::Lane) -> CD::Lane,
+) where
+    N: Number,
+    CA: ClassOf<N>,
+    CB: ClassOf<N>,
+    CD: ClassOf<N>,
+    A: Source<N, CA>,
+    B: Source<N, CB>,
+{
+    blocks!(state, CD, d, |entry, lane, old| {
+        let (a, b) = (a.block(entry, lane), b.block(entry, lane));
+        let mut new = old.read();
+        for k in 0..BLOCK {
+            new[k] = f(new[k], a[k], b[k]);
+        }
+        new
+    });
+}

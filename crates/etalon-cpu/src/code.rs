@@ -70,6 +70,8 @@ pub(crate) struct Code {
     pub(crate) constants: Vec<(Slot, u32)>,
     pub(crate) loops: Vec<Span>,
     pub(crate) resources: Resources,
+    /// See [`crate::ir::Tree::independent`].
+    pub(crate) independent: bool,
     /// Registers in each file: floats and integers of lanes, then single ones.
     pub(crate) files: [u32; 4],
 }
@@ -111,6 +113,7 @@ impl Code {
         let mut code = Self {
             loops: flat.loops.clone(),
             resources: flat.resources.clone(),
+            independent: flat.independent,
             files,
             ..Self::default()
         };
@@ -154,13 +157,6 @@ impl Code {
             }
         }
         Ok(code)
-    }
-
-    /// Whether a workgroup must run as one batch.
-    pub(crate) fn needs_whole_workgroup(&self) -> bool {
-        self.resources.workgroup.float > 0
-            || self.resources.workgroup.int > 0
-            || self.insts.iter().any(|inst| inst.op == Op::Barrier)
     }
 
     /// Whether results may depend on the order in which workgroups run: an

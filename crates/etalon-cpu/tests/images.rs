@@ -91,8 +91,13 @@ fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
                 };
                 // Where there is no texel, the channels the format has not are zero as well.
                 let want = inside.map_or([0; 4], bits);
+                // The payload of a NaN is nobody's promise.
+                let same = got.iter().zip(want).all(|(&got, want)| {
+                    let nans = [got, want].map(|bits| f32::from_bits(bits).is_nan());
+                    got == want || format.sample_kind() == SampleKind::Float && nans == [true; 2]
+                });
                 assert!(
-                    got == want,
+                    same,
                     "{format}, {name}, {x},{y} layer {layer} level {level}: {got:x?}, not {want:x?}"
                 );
             }

@@ -219,8 +219,6 @@ impl<N: Number, C: Selects<N>, A: Source<N, C>> Step<N> for CopyMasked<C, A> {
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let a = A::open(state, instr.a);
         let mask = <V<N, Int> as Source<N, Int>>::open(state, instr.c);
-        update2::<N, C, Int, C, _, _>(state, instr.d, a, mask, |d, a, mask| {
-            C::select(mask, a, d)
-        });
+        update2::<N, C, Int, C, _, _>(state, instr.d, a, mask, |d, a, mask| C::select(mask, a, d));
     }
 }

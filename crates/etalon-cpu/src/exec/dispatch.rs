@@ -63,8 +63,9 @@ impl Executor {
         self
     }
 
-    /// The most lanes of a workgroup that run together, rounded up to a multiple
-    /// of 64. Workgroups that share memory or have barriers always run whole.
+    /// The most lanes that run together, rounded up to a multiple of 64: a part
+    /// of a workgroup, or several workgroups. Workgroups whose invocations share
+    /// memory or meet at barriers always run whole, and one at a time.
     #[must_use]
     pub fn with_lanes(mut self, lanes: u32) -> Self {
         self.batch = lanes.clamp(1, 1 << 16).next_multiple_of(LANES as u32);
@@ -177,11 +178,16 @@ impl<N: Number> Job<'_, N> {
         next: &AtomicU64,
         stop: &AtomicBool,
     ) -> Result<(), DispatchFailure> {
+        // A batch is a part of a workgroup, or several of them.
         let all_chunks = self.local_ids.active.len();
-        let most = if self.code.needs_whole_workgroup() {
-            all_chunks
+        let batch = executor.batch as usize / LANES;
+        let (most, together) = if !self.code.independent {
+            (all_chunks, 1)
+        } else if all_chunks >= batch {
+            (batch, 1)
         } else {
-            all_chunks.min(executor.batch as usize / LANES)
+            let together = batch / all_chunks;
+            (together * all_chunks, together as u64)
         };
         let mut state: Option<State<'_, N>> = None;
         let [x, y, _] = workgroups.map(u64::from);
@@ -194,7 +200,10 @@ impl<N: Number> Job<'_, N> {
                 Some(state) => state,
                 empty => empty.insert(self.state(most, workgroups)?),
             };
-            for index in first..(first + share).min(total) {
+            let end = (first + share).min(total);
+            let mut index = first;
+            while index < end {
+                let groups = together.min(end - index).min(x - index % x);
                 // Each is below its count, which is 32 bits.
                 state.workgroup = [
                     (index % x) as u32,
@@ -203,15 +212,17 @@ impl<N: Number> Job<'_, N> {
                 ];
                 state.workgroup_floats.fill(N::default());
                 state.workgroup_ints.fill(0);
+                let chunks = groups as usize * all_chunks;
                 let mut chunk = 0;
-                while chunk < all_chunks {
+                while chunk < chunks {
                     state.first_chunk = chunk;
-                    state.chunks = most.min(all_chunks - chunk);
+                    state.chunks = most.min(chunks - chunk);
                     chunk += state.chunks;
                     self.linked
                         .run(state, executor.max_trips)
                         .map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
                 }
+                index += groups;
             }
         }
     }

@@ -2,21 +2,23 @@
 
 use std::sync::atomic::Ordering;
 
+use super::isa::Isa;
 use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
-use super::tier::{Handler, Step, Tier};
+use super::texels::{OUTSIDE, fetch, put};
+use super::tier::{Handler, Step, Tier, TieredStep};
 use crate::code::{CodeInst, Slot};
 use crate::ir::{ImageAccess, ImageQuery, Op};
-use crate::memory::{Level, Texels, TextureView, decode, encode};
+use crate::memory::{Level, Texels, TextureView};
 use crate::num::{Number, mask};
 use crate::registers::LANES;
 
 pub(super) fn load<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     if varying {
-        Handler::new::<Load<LANES>>(tier)
+        Handler::tiered::<Load<LANES>>(tier)
     } else {
-        Handler::plain::<Load<1>>()
+        Handler::tiered::<Load<1>>(Tier::Baseline)
     }
 }
 
@@ -34,9 +36,6 @@ pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a Tex
         _ => None,
     }
 }
-
-/// Stands for a texel outside: no texture has so many.
-pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// The indices of texels; coordinates are unsigned, so that negative ones are outside.
 #[inline(always)]
@@ -176,9 +175,9 @@ pub(super) fn wanted(inst: &CodeInst) -> [bool; 4] {
 
 struct Load<const K: usize>;
 
-impl<N: Number, const K: usize> Step<N> for Load<K> {
+impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: &Instr) {
+    fn run<I: Isa>(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::ImageLoad { access, level, .. } = inst.op else {
             return;
@@ -191,20 +190,11 @@ impl<N: Number, const K: usize> Step<N> for Load<K> {
         } else {
             None
         };
-        let format = texture.desc().format;
         let wanted = wanted(inst);
         for chunk in 0..rounds::<N, K>(state) {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
-            let mut words = [[0; K]; 2];
-            gather(texture.texels, &index, &mut words);
             let mut channels = [[0; K]; 4];
-            decode(format, &words, wanted, &mut channels);
-            // Channels that the format has not are 0, 0, 1 inside only.
-            for channel in format.channels() as usize..4 {
-                for k in 0..K {
-                    channels[channel][k] &= mask(index[k] != OUTSIDE);
-                }
-            }
+            fetch::<I, K>(texture, &index, wanted, &mut channels);
             for (result, channel) in inst.results.iter().zip(&channels) {
                 if let Some(to) = *result {
                     state.set_bits(to, chunk, channel);
@@ -216,9 +206,9 @@ impl<N: Number, const K: usize> Step<N> for Load<K> {
 
 pub(super) struct Store;
 
-impl<N: Number> Step<N> for Store {
+impl<N: Number> TieredStep<N> for Store {
     #[inline(always)]
-    fn run(state: &mut State<'_, N>, instr: &Instr) {
+    fn run<I: Isa>(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         let Op::ImageStore { access, .. } = inst.op else {
             return;
@@ -236,54 +226,7 @@ impl<N: Number> Step<N> for Store {
                 }
             }
             let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
-            let mut words = [[0; LANES]; 2];
-            encode(texture.desc().format, &channels, &mut words);
-            scatter(texture.texels, &index, &words);
-        }
-    }
-}
-
-/// Writes words where the index is inside.
-#[inline(always)]
-fn scatter(texels: &Texels, index: &[u32; LANES], words: &[[u64; LANES]; 2]) {
-    let [low, high] = words;
-    match texels {
-        Texels::B1(texels) => {
-            for k in 0..LANES {
-                if let Some(texel) = texels.get(index[k] as usize) {
-                    texel.store(low[k] as u8, Ordering::Relaxed);
-                }
-            }
-        }
-        Texels::B2(texels) => {
-            for k in 0..LANES {
-                if let Some(texel) = texels.get(index[k] as usize) {
-                    texel.store(low[k] as u16, Ordering::Relaxed);
-                }
-            }
-        }
-        Texels::B4(texels) => {
-            for k in 0..LANES {
-                if let Some(texel) = texels.get(index[k] as usize) {
-                    texel.store(low[k] as u32, Ordering::Relaxed);
-                }
-            }
-        }
-        Texels::B8(texels) => {
-            for k in 0..LANES {
-                if let Some(texel) = texels.get(index[k] as usize) {
-                    texel.store(low[k], Ordering::Relaxed);
-                }
-            }
-        }
-        Texels::B16(texels) => {
-            for k in 0..LANES {
-                let at = index[k] as usize * 2;
-                if let Some([l, h]) = texels.get(at..at + 2) {
-                    l.store(low[k], Ordering::Relaxed);
-                    h.store(high[k], Ordering::Relaxed);
-                }
-            }
+            put::<I, LANES>(texture, &index, &channels);
         }
     }
 }

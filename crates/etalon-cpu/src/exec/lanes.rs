@@ -17,7 +17,7 @@ use crate::num::Number;
 use crate::registers::{ClassOf, LANES, Lanes};
 
 /// Lanes that a loop handles together.
-const BLOCK: usize = 16;
+pub(super) const BLOCK: usize = 16;
 
 /// An operand of class `C` that loops over lanes read.
 pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {

@@ -1,13 +1,13 @@
 //! A program's instructions as calls.
 
 use super::arith::{self, Select};
+use super::lanes::BLOCK;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
 use super::{image, memory, sample};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::Op;
 use crate::num::Number;
-use crate::registers::LANES;
 
 /// The registers of a simple instruction, and where the whole one is found.
 #[derive(Clone, Copy, Debug, Default)]
@@ -145,7 +145,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::MemoryStore { .. } => Handler::plain::<memory::MemoryStore>(),
         Op::WorkgroupAtomic { .. } => Handler::plain::<memory::WorkgroupAtomic>(),
         Op::ImageLoad { .. } => image::load(tier, varying_result),
-        Op::ImageStore { .. } => Handler::new::<image::Store>(tier),
+        Op::ImageStore { .. } => Handler::tiered::<image::Store>(tier),
         Op::ImageSample { .. } => sample::sample(tier, varying_result),
         Op::ImageQuery { .. } => image::query(tier, varying_result),
         Op::Barrier => Handler::plain::<Barrier>(),
@@ -158,11 +158,15 @@ struct Any;
 impl<N: Number> Step<N> for Any {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let mut all = [0; LANES];
+        let mut all = [0; BLOCK];
         for chunk in 0..state.chunks {
-            let lanes = &state.registers.ints[state.at(instr.a, chunk)].0;
-            for k in 0..LANES {
-                all[k] |= lanes[k];
+            let (blocks, _) = state.registers.ints[state.at(instr.a, chunk)]
+                .0
+                .as_chunks::<BLOCK>();
+            for block in blocks {
+                for k in 0..BLOCK {
+                    all[k] |= block[k];
+                }
             }
         }
         state.any = all.iter().fold(0, |all, lane| all | lane) != 0;
@@ -177,7 +181,7 @@ impl<N: Number> Step<N> for Barrier {
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
         for chunk in 0..state.chunks {
-            let active = state.local_ids.active[state.first_chunk + chunk].0;
+            let active = state.local_ids.active[state.local_chunk(chunk)].0;
             let mask = state.mask(inst, chunk);
             if active
                 .iter()

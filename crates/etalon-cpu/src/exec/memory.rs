@@ -31,6 +31,12 @@ impl<N: Number> Step<N> for InputStep {
         };
         let axis = |axis: u8| usize::from(axis.min(2));
         let lanes = match input {
+            Input::BatchedWorkgroupX => {
+                for chunk in 0..state.chunks {
+                    state.set_ints(to, chunk, &[state.workgroup_x(chunk); LANES]);
+                }
+                return;
+            }
             Input::LocalId(a) => &state.local_ids.ids[axis(a)],
             Input::LocalIndex => &state.local_ids.ids[3],
             Input::ActiveLanes => &state.local_ids.active,
@@ -38,7 +44,7 @@ impl<N: Number> Step<N> for InputStep {
             Input::NumWorkgroups(a) => return state.set_ints(to, 0, &[state.workgroups[axis(a)]]),
         };
         for chunk in 0..state.chunks {
-            let lanes = lanes[state.first_chunk + chunk].0;
+            let lanes = lanes[state.local_chunk(chunk)].0;
             state.set_ints(to, chunk, &lanes);
         }
     }

@@ -12,11 +12,15 @@ mod arith;
 mod dispatch;
 mod image;
 #[allow(unsafe_code)]
+mod isa;
+#[allow(unsafe_code)]
 mod lanes;
 mod link;
 mod memory;
 mod sample;
 mod state;
+#[allow(unsafe_code)]
+mod texels;
 #[allow(unsafe_code)]
 mod tier;
 

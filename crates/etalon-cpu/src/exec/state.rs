@@ -78,6 +78,7 @@ pub(crate) struct State<'a, N> {
     pub(crate) local_ids: &'a LocalIds,
     /// First chunk of the workgroup that the batch has.
     pub(crate) first_chunk: usize,
+    /// The workgroup, or the first of several.
     pub(crate) workgroup: [u32; 3],
     pub(crate) workgroups: [u32; 3],
     /// What [`super::link`]'s test of a mask found.
@@ -92,6 +93,19 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn inst(&self, index: u32) -> &'a CodeInst {
         let code = self.code;
         &code.insts[index as usize]
+    }
+
+    /// Which chunk of its workgroup a chunk of the batch is. A batch has parts of
+    /// one workgroup, or several whole ones.
+    #[inline(always)]
+    pub(crate) fn local_chunk(&self, chunk: usize) -> usize {
+        (self.first_chunk + chunk) % self.local_ids.active.len()
+    }
+
+    /// `workgroup_id.x` of a chunk of the batch.
+    #[inline(always)]
+    pub(crate) fn workgroup_x(&self, chunk: usize) -> u32 {
+        self.workgroup[0] + ((self.first_chunk + chunk) / self.local_ids.active.len()) as u32
     }
 
     /// Where a chunk of a register of lanes is.

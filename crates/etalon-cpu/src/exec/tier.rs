@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use super::isa::{self, Isa};
 use super::link::Instr;
 use super::state::State;
 use crate::num::Number;
@@ -14,7 +15,7 @@ use crate::num::Number;
 pub enum Tier {
     /// What every processor of the architecture has: SSE2 on x86-64.
     Baseline,
-    /// AVX2.
+    /// AVX2 and F16C.
     Avx2,
     /// AVX-512 F, BW, DQ and VL.
     Avx512,
@@ -30,10 +31,12 @@ impl Tier {
         match self {
             Self::Baseline => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => std::is_x86_feature_detected!("avx2"),
+            Self::Avx2 => {
+                std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("f16c")
+            }
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
-                std::is_x86_feature_detected!("avx2")
+                Self::Avx2.is_available()
                     && std::is_x86_feature_detected!("avx512f")
                     && std::is_x86_feature_detected!("avx512bw")
                     && std::is_x86_feature_detected!("avx512dq")
@@ -80,6 +83,11 @@ pub(super) trait Step<N: Number> {
     fn run(state: &mut State<'_, N>, instr: &Instr);
 }
 
+/// A [`Step`] that uses what the instruction sets have.
+pub(super) trait TieredStep<N: Number> {
+    fn run<I: Isa>(state: &mut State<'_, N>, instr: &Instr);
+}
+
 type Function<N> = unsafe fn(&mut State<'_, N>, &Instr);
 
 /// A [`Step`] compiled for an instruction set that this processor has.
@@ -107,6 +115,17 @@ impl<N: Number> Handler<N> {
         })
     }
 
+    /// [`Handler::new`] for a step that is told the instruction set.
+    pub(super) fn tiered<S: TieredStep<N>>(tier: Tier) -> Self {
+        Self(match tier.or_baseline() {
+            #[cfg(target_arch = "x86_64")]
+            Tier::Avx512 => avx512::<N, Told<S, isa::Avx512>>,
+            #[cfg(target_arch = "x86_64")]
+            Tier::Avx2 => avx2::<N, Told<S, isa::Avx2>>,
+            _ => S::run::<isa::Portable>,
+        })
+    }
+
     /// The step for the baseline.
     pub(super) fn plain<S: Step<N>>() -> Self {
         Self(S::run)
@@ -114,21 +133,31 @@ impl<N: Number> Handler<N> {
 
     #[inline(always)]
     pub(super) fn call(self, state: &mut State<'_, N>, instr: &Instr) {
-        // SAFETY: of the two constructors `plain` takes functions without target
-        // features, and `new` takes one with them only after the processor was
+        // SAFETY: of the constructors `plain` takes functions without target
+        // features, the others take one with them only after the processor was
         // seen to have them.
         unsafe { (self.0)(state, instr) }
     }
 }
 
+/// A [`TieredStep`] that was told the instruction set.
+struct Told<S, I>(std::marker::PhantomData<(S, I)>);
+
+impl<N: Number, S: TieredStep<N>, I: Isa> Step<N> for Told<S, I> {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        S::run::<I>(state, instr);
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,f16c")]
 fn avx2<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: &Instr) {
     S::run(state, instr);
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,avx512f,avx512bw,avx512dq,avx512vl")]
+#[target_feature(enable = "avx2,f16c,avx512f,avx512bw,avx512dq,avx512vl")]
 fn avx512<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: &Instr) {
     S::run(state, instr);
 }

@@ -122,6 +122,9 @@ pub(crate) struct Tree {
     pub(crate) prologue: Vec<Inst>,
     pub(crate) body: Vec<Node>,
     pub(crate) resources: Resources,
+    /// Whether invocations of several workgroups can run together: none of
+    /// them waits for others or shares memory with them.
+    pub(crate) independent: bool,
 }
 
 /// What the instructions refer to by index.

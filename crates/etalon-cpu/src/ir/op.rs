@@ -13,6 +13,9 @@ pub(crate) enum Input {
     LocalIndex,
     /// `workgroup_id`, by axis.
     WorkgroupId(u8),
+    /// `workgroup_id.x` where a batch may hold several workgroups, next to each
+    /// other in x.
+    BatchedWorkgroupX,
     /// `num_workgroups`, by axis.
     NumWorkgroups(u8),
     /// All ones in lanes that hold an invocation.
@@ -189,7 +192,10 @@ impl Op {
         match self {
             Self::Input(input) => matches!(
                 input,
-                Input::LocalId(_) | Input::LocalIndex | Input::ActiveLanes
+                Input::LocalId(_)
+                    | Input::LocalIndex
+                    | Input::ActiveLanes
+                    | Input::BatchedWorkgroupX
             ),
             Self::MemoryLoad { memory, .. } => memory == Memory::Private,
             Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } => true,
@@ -242,6 +248,7 @@ impl fmt::Display for Op {
                 Input::LocalId(a) => write!(f, "local_id.{}", axis(a)),
                 Input::LocalIndex => f.write_str("local_index"),
                 Input::WorkgroupId(a) => write!(f, "workgroup_id.{}", axis(a)),
+                Input::BatchedWorkgroupX => f.write_str("workgroup_id.x per lane"),
                 Input::NumWorkgroups(a) => write!(f, "num_workgroups.{}", axis(a)),
                 Input::ActiveLanes => f.write_str("active_lanes"),
             },

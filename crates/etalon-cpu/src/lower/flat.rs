@@ -105,4 +105,6 @@ pub(crate) struct Flat {
     /// Where each counted loop is.
     pub(crate) loops: Vec<Span>,
     pub(crate) resources: Resources,
+    /// See [`crate::ir::Tree::independent`].
+    pub(crate) independent: bool,
 }

@@ -20,6 +20,7 @@ pub(super) fn flatten(tree: &Tree, uniformity: &Uniformity, partial: bool) -> Fl
         uniformity,
         flat: Flat {
             resources: tree.resources.clone(),
+            independent: tree.independent,
             ..Flat::default()
         },
         variables: tree.values.len() as u32,

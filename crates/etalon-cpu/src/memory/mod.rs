@@ -10,5 +10,5 @@ mod texture;
 pub use buffer::Buffer;
 pub use texture::{Texture, TextureView};
 
-pub(crate) use texel::{decode, encode};
+pub(crate) use texel::{Channels, decode, encode, unorm8};
 pub(crate) use texture::{Level, Texels};

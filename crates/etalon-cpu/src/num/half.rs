@@ -9,10 +9,11 @@ pub(crate) fn f16_to_f32(bits: u32) -> f32 {
     // Read as binary32 the magnitude has an exponent that is 112 too small,
     // also when it is subnormal: the product is exact.
     let finite = f32::from_bits(magnitude) * f32::from_bits((127 + 112) << 23);
-    // Infinity and NaN keep an exponent of all ones.
-    let special = magnitude | 0x7f80_0000;
-    let is_special = super::mask(magnitude >= 0x0f80_0000);
-    f32::from_bits((finite.to_bits() & !is_special) | (special & is_special) | sign)
+    // Infinity and NaN keep their mantissa, and get an exponent of all ones. A
+    // NaN becomes a quiet one, as in processors.
+    let special = super::mask(magnitude >= 0x0f80_0000) & 0x7f80_0000;
+    let quiet = super::mask(magnitude > 0x0f80_0000) & 0x0040_0000;
+    f32::from_bits(finite.to_bits() | special | quiet | sign)
 }
 
 /// Rounds to the nearest binary16, ties to even; overflow gives infinity, NaN
@@ -37,9 +38,8 @@ pub(crate) fn f32_to_f16(value: f32) -> u32 {
     let is_infinite = super::mask(magnitude >= 0x477f_f000);
     let is_nan = super::mask(magnitude > 0x7f80_0000);
     let finite = (subnormal & is_subnormal) | (normal & !is_subnormal);
-    // A NaN must stay one when the low bits of its payload are cut.
-    let payload = magnitude >> 13 & 0x3ff;
-    let special = 0x7c00 | (is_nan & (payload | (super::mask(payload == 0) & 0x200)));
+    // A NaN becomes a quiet one with what fits of its payload.
+    let special = 0x7c00 | (is_nan & (magnitude >> 13 & 0x3ff | 0x200));
     (finite & !is_infinite) | (special & is_infinite) | sign
 }
 
@@ -54,7 +54,7 @@ mod tests {
             let value = f16_to_f32(bits.into());
             if reference.is_nan() {
                 assert!(value.is_nan());
-                assert_eq!(f32_to_f16(value), u32::from(bits));
+                assert_eq!(f32_to_f16(value), u32::from(bits) | 0x200);
             } else {
                 assert_eq!(value.to_bits(), reference.to_f32().to_bits());
                 assert_eq!(f32_to_f16(value), u32::from(bits));

@@ -109,6 +109,7 @@ pub(crate) fn translate(
         private_variables: Vec::new(),
         workgroup_size: module.entry_points[entry_point].workgroup_size,
     };
+    translator.builder.tree.independent = !scan::is_collective(module, info, entry_point);
     match translator.entry_point(entry_point) {
         Ok(()) => Ok(Translation {
             bindings: translator.bindings,
@@ -254,16 +255,14 @@ impl<'a> Translator<'a> {
         let values = match builtin {
             B::LocalInvocationId => (0..3).map(|axis| self.local_id(axis)).collect(),
             B::LocalInvocationIndex => vec![self.input(Input::LocalIndex)],
-            B::WorkGroupId => (0..3)
-                .map(|axis| self.input(Input::WorkgroupId(axis)))
-                .collect(),
+            B::WorkGroupId => (0..3).map(|axis| self.workgroup_id(axis)).collect(),
             B::NumWorkGroups => (0..3)
                 .map(|axis| self.input(Input::NumWorkgroups(axis)))
                 .collect(),
             B::GlobalInvocationId => (0..3_u8)
                 .map(|axis| {
                     let size = self.builder.int(size[usize::from(axis)]);
-                    let group = self.input(Input::WorkgroupId(axis));
+                    let group = self.workgroup_id(axis);
                     let first = self.builder.arith(crate::ir::Arith::MulI, &[group, size]);
                     let local = self.local_id(axis);
                     self.builder.arith(crate::ir::Arith::AddI, &[first, local])
@@ -280,6 +279,14 @@ impl<'a> Translator<'a> {
             return self.builder.int(0);
         }
         self.input(Input::LocalId(axis))
+    }
+
+    fn workgroup_id(&mut self, axis: u8) -> Value {
+        self.input(if axis == 0 && self.builder.tree.independent {
+            Input::BatchedWorkgroupX
+        } else {
+            Input::WorkgroupId(axis)
+        })
     }
 
     fn input(&mut self, input: Input) -> Value {

@@ -3,7 +3,11 @@
 
 use std::collections::{HashMap, HashSet};
 
-use naga::{Block, Expression, Function, GlobalVariable, Handle, LocalVariable, Module, Statement};
+use naga::valid::ModuleInfo;
+use naga::{
+    AddressSpace, Binding, Block, BuiltIn, Expression, Function, GlobalVariable, Handle,
+    LocalVariable, Module, Statement, TypeInner,
+};
 
 /// What a pointer or value was derived from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -134,6 +138,52 @@ pub(super) fn assigned(function: &Function, block: &Block, roots: &mut HashSet<R
         _ => {}
     });
     calls
+}
+
+/// Whether invocations of a workgroup depend on each other: they share memory,
+/// or wait for or talk to each other.
+pub(super) fn is_collective(module: &Module, info: &ModuleInfo, entry_point: usize) -> bool {
+    let used = info.get_entry_point(entry_point);
+    let shares = module.global_variables.iter().any(|(handle, global)| {
+        global.space == AddressSpace::WorkGroup && !used[handle].is_empty()
+    });
+    let mut meets = false;
+    let functions = module.functions.iter().map(|(_, function)| function);
+    for function in functions.chain([&module.entry_points[entry_point].function]) {
+        for_each(&function.body, &mut |statement| {
+            meets |= matches!(
+                statement,
+                Statement::ControlBarrier(_)
+                    | Statement::MemoryBarrier(_)
+                    | Statement::WorkGroupUniformLoad { .. }
+                    | Statement::SubgroupBallot { .. }
+                    | Statement::SubgroupGather { .. }
+                    | Statement::SubgroupCollectiveOperation { .. }
+            );
+        });
+    }
+    let arguments = &module.entry_points[entry_point].function.arguments;
+    let is_subgroup = |binding: &Option<Binding>| {
+        matches!(
+            binding,
+            Some(Binding::BuiltIn(
+                BuiltIn::SubgroupId
+                    | BuiltIn::SubgroupInvocationId
+                    | BuiltIn::SubgroupSize
+                    | BuiltIn::NumSubgroups
+            ))
+        )
+    };
+    let numbered = arguments.iter().any(|argument| {
+        is_subgroup(&argument.binding)
+            || match &module.types[argument.ty].inner {
+                TypeInner::Struct { members, .. } => {
+                    members.iter().any(|member| is_subgroup(&member.binding))
+                }
+                _ => false,
+            }
+    });
+    shares || meets || numbered
 }
 
 fn for_each(block: &Block, visit: &mut impl FnMut(&Statement)) {

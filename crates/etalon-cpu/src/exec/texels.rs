@@ -1,0 +1,312 @@
+//! Many texels at once, between textures and lanes. Formats that images mostly
+//! have are decoded and encoded as vectors; the codec of
+//! [`etalon_core::texel`] serves all others, with the same bits.
+
+use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
+
+use etalon_core::Format;
+
+use super::isa::Isa;
+use super::lanes::BLOCK;
+use crate::memory::{Channels, Texels, TextureView, decode, encode, unorm8};
+use crate::num::{f16_to_f32, f32_to_f16};
+
+/// Stands for a texel outside: no texture has so many.
+pub(super) const OUTSIDE: u32 = u32::MAX;
+
+/// A texel's bytes in memory, or half of them.
+trait Word: Sync {
+    type Bits: Copy + Default;
+    fn get(&self) -> Self::Bits;
+    fn put(&self, bits: Self::Bits);
+}
+
+macro_rules! word {
+    ($atomic:ty, $bits:ty) => {
+        impl Word for $atomic {
+            type Bits = $bits;
+            #[inline(always)]
+            fn get(&self) -> $bits {
+                self.load(Ordering::Relaxed)
+            }
+            #[inline(always)]
+            fn put(&self, bits: $bits) {
+                self.store(bits, Ordering::Relaxed);
+            }
+        }
+    };
+}
+
+word!(AtomicU8, u8);
+word!(AtomicU16, u16);
+word!(AtomicU32, u32);
+word!(AtomicU64, u64);
+
+/// Whether every index, `per` words each, is in `words`.
+#[inline(always)]
+fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> bool {
+    let last = index
+        .iter()
+        .fold(0_u32, |last, &i| if i > last { i } else { last });
+    (last as usize + 1).saturating_mul(per) <= words.len()
+}
+
+/// The words at `index`, zero outside.
+#[inline(always)]
+fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] {
+    let mut bits = [W::Bits::default(); K];
+    if all_inside(words, index, 1) {
+        for k in 0..K {
+            // SAFETY: all indices were seen to be inside.
+            bits[k] = unsafe { words.get_unchecked(index[k] as usize) }.get();
+        }
+    } else {
+        for k in 0..K {
+            bits[k] = words.get(index[k] as usize).map_or(bits[k], Word::get);
+        }
+    }
+    bits
+}
+
+/// [`load`] where a texel has two words.
+#[inline(always)]
+fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K]; 2] {
+    let (mut low, mut high) = ([0; K], [0; K]);
+    if all_inside(words, index, 2) {
+        for k in 0..K {
+            let at = index[k] as usize * 2;
+            // SAFETY: all indices were seen to be inside.
+            unsafe {
+                low[k] = words.get_unchecked(at).get();
+                high[k] = words.get_unchecked(at + 1).get();
+            }
+        }
+    } else {
+        for k in 0..K {
+            let at = index[k] as usize * 2;
+            if let Some([l, h]) = words.get(at..at + 2) {
+                (low[k], high[k]) = (l.get(), h.get());
+            }
+        }
+    }
+    [low, high]
+}
+
+/// Writes the words at `index`, those inside.
+#[inline(always)]
+fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
+    if all_inside(words, index, 1) {
+        for k in 0..K {
+            // SAFETY: all indices were seen to be inside.
+            unsafe { words.get_unchecked(index[k] as usize) }.put(bits[k]);
+        }
+    } else {
+        for k in 0..K {
+            if let Some(word) = words.get(index[k] as usize) {
+                word.put(bits[k]);
+            }
+        }
+    }
+}
+
+/// Values of binary16 in the low halves of words.
+#[inline(always)]
+fn from_halves<I: Isa, const K: usize>(bits: &[u32; K], out: &mut [u32; K]) {
+    let (blocks, rest) = bits.as_chunks::<BLOCK>();
+    let (to, last) = out.as_chunks_mut::<BLOCK>();
+    for (block, to) in blocks.iter().zip(to) {
+        let values = I::from_halves(*block);
+        for k in 0..BLOCK {
+            to[k] = values[k].to_bits();
+        }
+    }
+    for (bits, to) in rest.iter().zip(last) {
+        *to = f16_to_f32(bits & 0xffff).to_bits();
+    }
+}
+
+/// The binary16 nearest to values, given as bits.
+#[inline(always)]
+fn to_halves<I: Isa, const K: usize>(values: &[u32; K]) -> [u32; K] {
+    let mut out = [0; K];
+    let (blocks, rest) = values.as_chunks::<BLOCK>();
+    let (to, last) = out.as_chunks_mut::<BLOCK>();
+    for (block, to) in blocks.iter().zip(to) {
+        let mut values = [0.0; BLOCK];
+        for k in 0..BLOCK {
+            values[k] = f32::from_bits(block[k]);
+        }
+        *to = I::to_halves(values);
+    }
+    for (bits, to) in rest.iter().zip(last) {
+        *to = f32_to_f16(f32::from_bits(*bits));
+    }
+    out
+}
+
+/// `$out[c] = $channel` for each channel that is wanted.
+macro_rules! channels {
+    ($wanted:ident, $out:ident, $($c:literal: |$k:ident| $channel:expr),*) => {
+        $(if $wanted[$c] {
+            for $k in 0..K {
+                $out[$c][$k] = $channel;
+            }
+        })*
+    };
+}
+
+/// `$out[c]` by [`from_halves`] for each channel that is wanted.
+macro_rules! halves {
+    ($wanted:ident, $out:ident, $($c:literal: |$k:ident| $bits:expr),*) => {
+        $(if $wanted[$c] {
+            let mut bits = [0; K];
+            for $k in 0..K {
+                bits[$k] = $bits;
+            }
+            from_halves::<I, K>(&bits, &mut $out[$c]);
+        })*
+    };
+}
+
+/// Reads the channels that `wanted` asks for; the others are left alone. All
+/// are zero outside.
+#[inline(always)]
+pub(super) fn fetch<I: Isa, const K: usize>(
+    texture: &TextureView<'_>,
+    index: &[u32; K],
+    wanted: [bool; 4],
+    out: &mut Channels<K>,
+) {
+    let format = texture.desc().format;
+    // The channels that the loops below decode; the others are 0, 0, 1.
+    let decoded = match (texture.texels, format) {
+        (Texels::B8(texels), Format::Rgba16Float) => {
+            let word = load(texels, index);
+            halves!(wanted, out,
+                0: |k| word[k] as u32,
+                1: |k| word[k] as u32 >> 16,
+                2: |k| (word[k] >> 32) as u32,
+                3: |k| (word[k] >> 48) as u32);
+            4
+        }
+        (Texels::B4(texels), Format::Rgba8Unorm) => {
+            let word = load(texels, index);
+            channels!(wanted, out,
+                0: |k| unorm8(word[k]),
+                1: |k| unorm8(word[k] >> 8),
+                2: |k| unorm8(word[k] >> 16),
+                3: |k| unorm8(word[k] >> 24));
+            4
+        }
+        (
+            Texels::B4(texels),
+            Format::R32Float | Format::Depth32Float | Format::R32Uint | Format::R32Sint,
+        ) => {
+            if wanted[0] {
+                out[0] = load(texels, index);
+            }
+            1
+        }
+        (Texels::B4(texels), Format::Rg16Float) => {
+            let word = load(texels, index);
+            halves!(wanted, out, 0: |k| word[k], 1: |k| word[k] >> 16);
+            2
+        }
+        (Texels::B2(texels), Format::R16Float) => {
+            let word = load(texels, index);
+            halves!(wanted, out, 0: |k| word[k].into());
+            1
+        }
+        (Texels::B8(texels), Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint) => {
+            let word = load(texels, index);
+            channels!(wanted, out, 0: |k| word[k] as u32, 1: |k| (word[k] >> 32) as u32);
+            2
+        }
+        (Texels::B16(texels), Format::Rgba32Float | Format::Rgba32Uint | Format::Rgba32Sint) => {
+            let [low, high] = load_pairs(texels, index);
+            channels!(wanted, out,
+                0: |k| low[k] as u32,
+                1: |k| (low[k] >> 32) as u32,
+                2: |k| high[k] as u32,
+                3: |k| (high[k] >> 32) as u32);
+            4
+        }
+        (texels, _) => {
+            decode(format, &words(texels, index), wanted, out);
+            4
+        }
+    };
+    let one = match format.sample_kind() {
+        etalon_core::format::SampleKind::Uint | etalon_core::format::SampleKind::Sint => 1,
+        _ => 1.0_f32.to_bits(),
+    };
+    for channel in decoded..4 {
+        if wanted[channel] {
+            out[channel] = [if channel == 3 { one } else { 0 }; K];
+        }
+    }
+    // Nor are there constant channels outside.
+    for channel in format.channels() as usize..4 {
+        if wanted[channel] {
+            for k in 0..K {
+                out[channel][k] &= crate::num::mask(index[k] != OUTSIDE);
+            }
+        }
+    }
+}
+
+/// Texels as words, whatever their size.
+#[inline(always)]
+fn words<const K: usize>(texels: &Texels, index: &[u32; K]) -> [[u64; K]; 2] {
+    match texels {
+        Texels::B1(texels) => [load(texels, index).map(u64::from), [0; K]],
+        Texels::B2(texels) => [load(texels, index).map(u64::from), [0; K]],
+        Texels::B4(texels) => [load(texels, index).map(u64::from), [0; K]],
+        Texels::B8(texels) => [load(texels, index), [0; K]],
+        Texels::B16(texels) => load_pairs(texels, index),
+    }
+}
+
+/// Writes texels where the index is inside.
+#[inline(always)]
+pub(super) fn put<I: Isa, const K: usize>(
+    texture: &TextureView<'_>,
+    index: &[u32; K],
+    channels: &Channels<K>,
+) {
+    let format = texture.desc().format;
+    match (texture.texels, format) {
+        (Texels::B8(texels), Format::Rgba16Float) => {
+            let [r, g, b, a] = [0, 1, 2, 3].map(|c| to_halves::<I, K>(&channels[c]));
+            let mut word = [0; K];
+            for k in 0..K {
+                let (low, high) = (r[k] | g[k] << 16, b[k] | a[k] << 16);
+                word[k] = u64::from(low) | u64::from(high) << 32;
+            }
+            store(texels, index, &word);
+        }
+        (Texels::B4(texels), Format::R32Float | Format::R32Uint | Format::R32Sint) => {
+            store(texels, index, &channels[0]);
+        }
+        _ => {
+            let mut words = [[0; K]; 2];
+            encode(format, channels, &mut words);
+            let [low, high] = words;
+            match texture.texels {
+                Texels::B1(texels) => store(texels, index, &low.map(|word| word as u8)),
+                Texels::B2(texels) => store(texels, index, &low.map(|word| word as u16)),
+                Texels::B4(texels) => store(texels, index, &low.map(|word| word as u32)),
+                Texels::B8(texels) => store(texels, index, &low),
+                Texels::B16(texels) => {
+                    for k in 0..K {
+                        let at = index[k] as usize * 2;
+                        if let Some([l, h]) = texels.get(at..at + 2) {
+                            l.put(low[k]);
+                            h.put(high[k]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

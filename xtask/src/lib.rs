@@ -5,10 +5,12 @@
 pub mod compare;
 pub mod drivers;
 pub mod execute;
+pub mod instructions;
 pub mod measure;
 pub mod setup;
 pub mod size;
 pub mod test_backends;
+pub mod vectors;
 
 use std::process::ExitCode;
 
@@ -28,6 +30,10 @@ enum Task {
     /// Every kernel on the interpreter and on a Vulkan driver, side by side;
     /// `--help` after it says more.
     BenchKernels(measure::Forwarded),
+    /// Look whether the interpreter's handlers use vector instructions.
+    CheckVectors(vectors::Options),
+    /// Count the instructions the interpreter executes for each kernel.
+    CountInstructions(instructions::Options),
     /// Run one job of test-backends.
     #[command(hide = true, name = test_backends::COMMAND)]
     Execute(execute::Job),
@@ -48,6 +54,12 @@ pub fn main() -> ExitCode {
         }
         Task::BenchKernels(arguments) => {
             conclude(measure::run("kernels", &arguments).map_err(|error| error.to_string()))
+        }
+        Task::CheckVectors(options) => {
+            conclude(vectors::run(&options).map_err(|error| error.to_string()))
+        }
+        Task::CountInstructions(options) => {
+            conclude(instructions::run(&options).map_err(|error| error.to_string()))
         }
         Task::Execute(job) => conclude(
             execute::run(&job)

@@ -2,9 +2,11 @@
 //! a program of its own does it, the package `etalon-measure`.
 
 use std::ffi::OsString;
-use std::process::Command;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 use clap::Args;
+use serde::Deserialize;
 use thiserror::Error;
 
 /// What the measuring program is given.
@@ -23,6 +25,12 @@ pub enum MeasureError {
     /// Cargo cannot be started.
     #[error("cargo cannot be started: {0}")]
     Cargo(std::io::Error),
+    /// The measuring program cannot be started.
+    #[error("the measuring program cannot be started: {0}")]
+    Start(std::io::Error),
+    /// Cargo failed, and has said why.
+    #[error("the measuring program cannot be built")]
+    Build,
 }
 
 /// Cargo, as this program was started by it.
@@ -34,13 +42,37 @@ fn cargo() -> Command {
 /// Returns whether it succeeded; it has said itself what went wrong.
 ///
 /// # Errors
-/// If there is no cargo.
+/// If it cannot be built or started.
 pub fn run(task: &str, forwarded: &Forwarded) -> Result<bool, MeasureError> {
-    let status = cargo()
-        .args(["run", "--quiet", "--release", "--package", "etalon-measure"])
-        .args(["--", task])
+    let status = Command::new(build()?)
+        .arg(task)
         .args(&forwarded.arguments)
         .status()
-        .map_err(MeasureError::Cargo)?;
+        .map_err(MeasureError::Start)?;
     Ok(status.success())
+}
+
+/// Builds the measuring program in release profile and says where it is.
+///
+/// # Errors
+/// If it cannot be built.
+pub fn build() -> Result<PathBuf, MeasureError> {
+    let output = cargo()
+        .args(["build", "--release", "--package", "etalon-measure"])
+        .args(["--message-format", "json-render-diagnostics"])
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(MeasureError::Cargo)?;
+    if !output.status.success() {
+        return Err(MeasureError::Build);
+    }
+    #[derive(Deserialize)]
+    struct Message {
+        executable: Option<PathBuf>,
+    }
+    let text = String::from_utf8_lossy(&output.stdout);
+    text.lines()
+        .filter_map(|line| serde_json::from_str::<Message>(line).ok())
+        .find_map(|message| message.executable)
+        .ok_or(MeasureError::Build)
 }

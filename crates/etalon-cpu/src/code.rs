@@ -57,6 +57,8 @@ pub(crate) struct CodeBlock {
     pub(crate) start: u32,
     pub(crate) stop: u32,
     pub(crate) end: End,
+    /// Which lanes are active in it: the number of a mask, or none for all.
+    pub(crate) lanes: Option<u32>,
 }
 
 /// A whole program.
@@ -149,6 +151,7 @@ impl Code {
                 start,
                 stop: code.insts.len() as u32,
                 end,
+                lanes: block.lanes,
             });
         }
         for (i, info) in flat.regs.iter().enumerate() {

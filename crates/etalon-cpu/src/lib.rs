@@ -30,6 +30,6 @@ mod translate;
 pub use backend::{CpuBackend, CpuOptions};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
-pub use exec::{DispatchCounters, Executor, Tier};
+pub use exec::{Cost, DispatchCounters, Executor, Profile, ProfiledInstruction, Tier};
 pub use memory::{Buffer, Texture, TextureView};
 pub use program::{BoundResource, Program};

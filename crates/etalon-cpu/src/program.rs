@@ -1,7 +1,7 @@
 //! Programs: kernels made ready to run.
 
 use std::fmt;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use etalon_core::kernel::Kernel;
 use etalon_core::resource::{Dimension, SamplerDesc};
@@ -11,7 +11,7 @@ use naga::{Module, ShaderStage, Span};
 use crate::binding::{BindingInfo, BindingKind, ChannelKind, View};
 use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
-use crate::exec::{DispatchCounters, Executor, Linked, Resource, Tier};
+use crate::exec::{DispatchCounters, Executor, Linked, Profile, Recording, Resource, Tier};
 use crate::memory::{Buffer, TextureView};
 use crate::translate::{self, Fail};
 use crate::{exec, lower};
@@ -26,6 +26,7 @@ pub struct Program {
     code: Code,
     local_ids: exec::LocalIds,
     linked: [OnceLock<Linked<f32>>; Tier::ALL.len()],
+    recording: Mutex<Recording>,
     locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
 }
 
@@ -165,6 +166,7 @@ impl Program {
             code,
             local_ids: exec::LocalIds::new(workgroup_size),
             linked: Default::default(),
+            recording: Mutex::default(),
             locate,
         })
     }
@@ -213,9 +215,19 @@ impl Program {
             resources: &bound,
             local_ids: &self.local_ids,
             invocations,
+            recording: executor.profiles().then_some(&self.recording),
         };
         job.run(executor, workgroups)
             .map_err(|failure| self.explain(failure, workgroups))
+    }
+
+    /// What its instructions have cost in dispatches by executors that
+    /// [profile](Executor::with_profile).
+    #[must_use]
+    pub fn profile(&self) -> Profile {
+        let recording = self.recording.lock();
+        let recording = recording.unwrap_or_else(PoisonError::into_inner);
+        recording.profile(&self.name, &self.code, &*self.locate)
     }
 
     fn explain(&self, failure: exec::DispatchFailure, [x, y, z]: [u32; 3]) -> RunError {

@@ -16,7 +16,7 @@ use etalon_core::resource::Limits;
 use self::histories::Histories;
 use self::pool::Pool;
 use crate::error::RunError;
-use crate::exec::{Executor, Tier};
+use crate::exec::{Executor, Profile, Tier};
 use crate::program::Program;
 
 /// How plans are run on the CPU.
@@ -31,6 +31,8 @@ pub struct CpuOptions {
     pub lanes: u32,
     /// See [`Executor::with_max_trips`].
     pub max_trips: u32,
+    /// See [`Executor::with_profile`].
+    pub profile: bool,
 }
 
 impl Default for CpuOptions {
@@ -40,6 +42,7 @@ impl Default for CpuOptions {
             tier: None,
             lanes: 64,
             max_trips: Executor::DEFAULT_MAX_TRIPS,
+            profile: false,
         }
     }
 }
@@ -67,6 +70,7 @@ impl CpuBackend {
         let executor = executor
             .with_lanes(options.lanes)
             .with_max_trips(options.max_trips)
+            .with_profile(options.profile)
             .with_tier(options.tier.unwrap_or_else(Tier::best));
         Ok(Self {
             executor,
@@ -81,6 +85,19 @@ impl CpuBackend {
     #[must_use]
     pub fn executor(&self) -> &Executor {
         &self.executor
+    }
+
+    /// What the instructions of every kernel run have cost since the backend
+    /// was made, by name of kernel; all zero unless [`CpuOptions::profile`] was
+    /// set.
+    #[must_use]
+    pub fn profiles(&self) -> Vec<Profile> {
+        let mut programs: Vec<_> = self.programs.iter().collect();
+        programs.sort_by(|(a, one), (b, other)| (one.name(), a).cmp(&(other.name(), b)));
+        programs
+            .into_iter()
+            .map(|(_, program)| program.profile())
+            .collect()
     }
 
     /// The bytecode of a kernel, for reading; translated at most once.

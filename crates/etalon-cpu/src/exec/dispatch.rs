@@ -1,11 +1,12 @@
 //! Dispatching: workgroups over workers.
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
 use super::link::Linked;
+use super::profile::{Recorder, Recording, Unwatched, Watch};
 use super::state::{Failure, LocalIds, Resource, State};
 use super::tier::Tier;
 use crate::code::Code;
@@ -20,6 +21,7 @@ pub struct Executor {
     tier: Tier,
     batch: u32,
     max_trips: u32,
+    profile: bool,
 }
 
 /// What a dispatch did.
@@ -53,6 +55,7 @@ impl Executor {
             tier: Tier::best(),
             batch: LANES as u32,
             max_trips: Self::DEFAULT_MAX_TRIPS,
+            profile: false,
         })
     }
 
@@ -80,6 +83,21 @@ impl Executor {
         self
     }
 
+    /// Whether dispatches record what each instruction costs, for
+    /// [`Program::profile`](crate::Program::profile). They take up to twice as
+    /// long then; otherwise it costs nothing.
+    #[must_use]
+    pub fn with_profile(mut self, profile: bool) -> Self {
+        self.profile = profile;
+        self
+    }
+
+    /// Whether dispatches are profiled.
+    #[must_use]
+    pub fn profiles(&self) -> bool {
+        self.profile
+    }
+
     /// The instruction set in use.
     #[must_use]
     pub fn tier(&self) -> Tier {
@@ -101,6 +119,17 @@ pub(crate) enum DispatchFailure {
     OutOfMemory(u64),
 }
 
+/// The workgroups of a dispatch, for workers to take from.
+struct Shares<'a> {
+    total: u64,
+    /// How many are taken at a time.
+    share: u64,
+    /// The first not taken yet.
+    next: &'a AtomicU64,
+    /// Whether a worker has failed.
+    stop: &'a AtomicBool,
+}
+
 /// A kernel ready to be dispatched.
 pub(crate) struct Job<'a, N: Number> {
     pub(crate) code: &'a Code,
@@ -108,6 +137,13 @@ pub(crate) struct Job<'a, N: Number> {
     pub(crate) resources: &'a [Resource<'a>],
     pub(crate) local_ids: &'a LocalIds,
     pub(crate) invocations: u32,
+    /// Where to record what instructions cost, if that is wanted.
+    pub(crate) recording: Option<&'a Mutex<Recording>>,
+}
+
+/// What a lock guards here is whole even if a holder of it panicked.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<N: Number> Job<'_, N> {
@@ -135,14 +171,24 @@ impl<N: Number> Job<'_, N> {
         };
         let share = (total / (threads as u64 * 16)).clamp(1, 64);
         let work = || {
-            let result = self.work(executor, workgroups, total, share, &next, &stop);
+            let shares = Shares {
+                total,
+                share,
+                next: &next,
+                stop: &stop,
+            };
+            let result = match self.recording {
+                None => self.work(executor, workgroups, &shares, &mut Unwatched),
+                Some(recording) => {
+                    let mut recorder = Recorder::new(self.code);
+                    let result = self.work(executor, workgroups, &shares, &mut recorder);
+                    lock(recording).add(recorder);
+                    result
+                }
+            };
             if let Err(found) = result {
                 stop.store(true, Ordering::Relaxed);
-                let mut failure = match failure.lock() {
-                    Ok(guard) => guard,
-                    Err(poisoned) => poisoned.into_inner(),
-                };
-                failure.get_or_insert(found);
+                lock(&failure).get_or_insert(found);
             }
         };
         if threads == 1 {
@@ -173,11 +219,15 @@ impl<N: Number> Job<'_, N> {
         &self,
         executor: &Executor,
         workgroups: [u32; 3],
-        total: u64,
-        share: u64,
-        next: &AtomicU64,
-        stop: &AtomicBool,
+        shares: &Shares<'_>,
+        watch: &mut impl Watch<N>,
     ) -> Result<(), DispatchFailure> {
+        let &Shares {
+            total,
+            share,
+            next,
+            stop,
+        } = shares;
         // A batch is a part of a workgroup, or several of them.
         let all_chunks = self.local_ids.active.len();
         let batch = executor.batch as usize / LANES;
@@ -219,7 +269,7 @@ impl<N: Number> Job<'_, N> {
                     state.chunks = most.min(chunks - chunk);
                     chunk += state.chunks;
                     self.linked
-                        .run(state, executor.max_trips)
+                        .run(state, executor.max_trips, watch)
                         .map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
                 }
                 index += groups;

@@ -2,6 +2,7 @@
 
 use super::arith::{self, Select};
 use super::lanes::BLOCK;
+use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
 use super::{image, memory, sample};
@@ -66,13 +67,20 @@ impl<N: Number> Linked<N> {
     }
 
     /// Runs one batch.
-    pub(super) fn run(&self, state: &mut State<'_, N>, max_trips: u32) -> Result<(), Failure> {
+    pub(super) fn run<W: Watch<N>>(
+        &self,
+        state: &mut State<'_, N>,
+        max_trips: u32,
+        watch: &mut W,
+    ) -> Result<(), Failure> {
         let code = state.code;
         let mut next = 0_u32;
+        watch.batch(state);
         loop {
             let block = code.blocks[next as usize];
+            watch.block(state, next);
             for (handler, instr) in &self.calls[block.start as usize..block.stop as usize] {
-                handler.call(state, instr);
+                watch.run(*handler, state, instr);
             }
             next = match block.end {
                 End::Jump(next) => next,
@@ -110,6 +118,7 @@ impl<N: Number> Linked<N> {
                 }
                 End::Stop => break,
             };
+            watch.turn(state, block.end, next);
         }
         match state.failure.take() {
             Some(failure) => Err(failure),

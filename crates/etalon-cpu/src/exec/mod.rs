@@ -17,6 +17,7 @@ mod isa;
 mod lanes;
 mod link;
 mod memory;
+mod profile;
 mod sample;
 mod state;
 #[allow(unsafe_code)]
@@ -25,8 +26,10 @@ mod texels;
 mod tier;
 
 pub use dispatch::{DispatchCounters, Executor};
+pub use profile::{Cost, Profile, ProfiledInstruction};
 pub use tier::Tier;
 
 pub(crate) use dispatch::{DispatchFailure, Job};
 pub(crate) use link::Linked;
+pub(crate) use profile::Recording;
 pub(crate) use state::{Failure, LocalIds, Resource};

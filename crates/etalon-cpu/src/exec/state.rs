@@ -185,6 +185,16 @@ impl<'a, N: Number> State<'a, N> {
             None => [u32::MAX; LANES],
         }
     }
+
+    /// Lanes of the batch that hold an invocation.
+    pub(crate) fn invocations(&self) -> u64 {
+        (0..self.chunks)
+            .map(|chunk| {
+                let active = &self.local_ids.active[self.local_chunk(chunk)].0;
+                active.iter().filter(|&&lane| lane != 0).count() as u64
+            })
+            .sum()
+    }
 }
 
 #[inline(always)]

@@ -150,6 +150,46 @@ impl<N: Number, S: TieredStep<N>, I: Isa> Step<N> for Told<S, I> {
     }
 }
 
+/// A clock that is cheap to read. Readings are not ordered against the
+/// instructions around them, which is of no concern where handlers are called
+/// through pointers.
+pub(super) struct Ticks {
+    start: std::time::Instant,
+    first: u64,
+}
+
+impl Ticks {
+    /// Begins to find out how long a tick is.
+    pub(super) fn start() -> Self {
+        Self {
+            start: std::time::Instant::now(),
+            first: Self::now(),
+        }
+    }
+
+    /// A reading.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    pub(super) fn now() -> u64 {
+        // SAFETY: every x86-64 processor has the instruction.
+        unsafe { std::arch::x86_64::_rdtsc() }
+    }
+
+    /// A reading.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub(super) fn now() -> u64 {
+        static EPOCH: std::sync::OnceLock<std::time::Instant> = std::sync::OnceLock::new();
+        let epoch = EPOCH.get_or_init(std::time::Instant::now);
+        u64::try_from(epoch.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    }
+
+    /// Nanoseconds of a tick, by the time since the start.
+    pub(super) fn nanoseconds_per_tick(&self) -> f64 {
+        let ticks = Self::now().saturating_sub(self.first).max(1);
+        self.start.elapsed().as_nanos() as f64 / ticks as f64
+    }
+}
+
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,f16c")]
 fn avx2<N: Number, S: Step<N>>(state: &mut State<'_, N>, instr: &Instr) {

@@ -93,6 +93,10 @@ impl Terminator {
 pub(crate) struct Block {
     pub(crate) insts: Vec<FlatInst>,
     pub(crate) end: Terminator,
+    /// Which lanes are active in it: the number of a mask, or none for all.
+    /// Masks have numbers of their own, since none need be kept in a register;
+    /// those inside of others have the greater ones.
+    pub(crate) lanes: Option<u32>,
 }
 
 /// A kernel as linear code. Blocks are in the order of the source, so a jump

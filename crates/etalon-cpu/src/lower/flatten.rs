@@ -26,6 +26,8 @@ pub(super) fn flatten(tree: &Tree, uniformity: &Uniformity, partial: bool) -> Fl
         variables: tree.values.len() as u32,
         constants: HashMap::new(),
         open: None,
+        lanes: None,
+        masks: Vec::new(),
         labels: Vec::new(),
         scopes: Vec::new(),
         ends: Vec::new(),
@@ -81,6 +83,10 @@ struct Flattener<'a> {
     constants: HashMap<u32, Reg>,
     /// Instructions of the block being written.
     open: Option<Vec<FlatInst>>,
+    /// Lanes active at the start of that block.
+    lanes: Option<u32>,
+    /// Registers of masks, by number.
+    masks: Vec<Reg>,
     /// Blocks of the labels; jumps hold labels until the end.
     labels: Vec<Option<BlockId>>,
     scopes: Vec<Scope>,
@@ -121,6 +127,7 @@ impl Flattener<'_> {
                 while let Some(Block {
                     insts,
                     end: Terminator::Jump(next),
+                    ..
                 }) = self.flat.blocks.get(block.0 as usize)
                     && insts.is_empty()
                     && let Some(Some(next)) = self.labels.get(next.0 as usize)
@@ -155,7 +162,11 @@ impl Flattener<'_> {
     /// Ends the open block, if any.
     fn close(&mut self, end: Terminator) {
         if let Some(insts) = self.open.take() {
-            self.flat.blocks.push(Block { insts, end });
+            self.flat.blocks.push(Block {
+                insts,
+                end,
+                lanes: self.lanes,
+            });
         }
     }
 
@@ -164,6 +175,17 @@ impl Flattener<'_> {
         self.close(Terminator::Jump(to(label)));
         self.labels[label.0 as usize] = Some(BlockId(self.flat.blocks.len() as u32));
         self.open = Some(Vec::new());
+        self.lanes = self.mask.map(|mask| self.number_of(mask));
+    }
+
+    /// The number of a mask.
+    fn number_of(&mut self, mask: Reg) -> u32 {
+        let known = self.masks.iter().position(|known| *known == mask);
+        let number = known.unwrap_or_else(|| {
+            self.masks.push(mask);
+            self.masks.len() - 1
+        });
+        number as u32
     }
 
     fn push(&mut self, op: Op, results: &[Reg], operands: &[Reg], mask: Option<Reg>) {
@@ -366,12 +388,13 @@ impl Flattener<'_> {
                     yes: to(then),
                     no: to(other),
                 });
-                self.start(then);
                 self.mask = Some(mask);
+                self.start(then);
                 if let Some(end) = self.ends.last_mut() {
                     *end = other;
                 }
                 self.nodes(accept);
+                self.mask = outer;
                 self.start(other);
                 if let Some(end) = self.ends.last_mut() {
                     *end = join;
@@ -388,8 +411,8 @@ impl Flattener<'_> {
                     yes: to(then),
                     no: to(join),
                 });
-                self.start(then);
                 self.mask = Some(mask);
+                self.start(then);
                 self.nodes(reject);
             }
         } else {
@@ -411,14 +434,14 @@ impl Flattener<'_> {
             self.nodes(accept);
             if !reject.is_empty() {
                 self.close(Terminator::Jump(to(join)));
-                self.start(other);
                 self.mask = outer;
+                self.start(other);
                 self.nodes(reject);
             }
         }
         self.ends.pop();
-        self.start(join);
         self.mask = outer;
+        self.start(join);
         self.narrow(&[accept, reject], is_last);
     }
 
@@ -520,8 +543,8 @@ impl Flattener<'_> {
         self.nodes(body);
         self.ends.pop();
         self.scopes.pop();
-        self.start(end);
         self.mask = outer;
+        self.start(end);
         self.narrow(&[body], is_last);
     }
 
@@ -557,8 +580,8 @@ impl Flattener<'_> {
         self.nodes(body);
         self.ends.pop();
         self.scopes.pop();
-        self.start(step);
         self.mask = in_loop;
+        self.start(step);
         self.ends.push(end);
         self.nodes(continuing);
         self.ends.pop();
@@ -598,8 +621,8 @@ impl Flattener<'_> {
             counter,
             head: to(head),
         });
-        self.start(end);
         self.mask = outer;
+        self.start(end);
     }
 }
 

@@ -40,7 +40,7 @@ impl Default for CpuOptions {
         Self {
             threads: 0,
             tier: None,
-            lanes: 64,
+            lanes: Executor::DEFAULT_LANES,
             max_trips: Executor::DEFAULT_MAX_TRIPS,
             profile: false,
         }

@@ -2,11 +2,11 @@
 
 use std::marker::PhantomData;
 
-use super::lanes::{Source, Uniform, Varying, map1, map2, map3, update2};
+use super::lanes::{Source, Uniform, Varying, map1, map2, map3, map4, update2};
 use super::link::Instr;
 use super::state::State;
 use super::tier::{Handler, Step, Tier};
-use crate::ir::arith::{Binary, Ternary, Unary, Visitor};
+use crate::ir::arith::{Binary, Quaternary, Ternary, Unary, Visitor};
 use crate::num::Number;
 use crate::registers::{Class, ClassOf, Float, Int};
 
@@ -51,6 +51,59 @@ impl<N: Number> Visitor<N> for Select<'_> {
             [false, true, false] => Handler::new::<L<O, U<N, O::A>, V<N, O::B>, U<N, O::C>>>(tier),
             [false, false, true] => Handler::new::<L<O, U<N, O::A>, U<N, O::B>, V<N, O::C>>>(tier),
             _ => Handler::plain::<TernaryUniform<O>>(),
+        }
+    }
+
+    fn quaternary<O: Quaternary<N> + 'static>(self) -> Handler<N> {
+        let tier = self.tier;
+        type L<O, A, B, C, E> = QuaternaryLanes<O, A, B, C, E>;
+        match self.varying {
+            [true, true, true, true] => {
+                Handler::new::<L<O, V<N, O::A>, V<N, O::B>, V<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [true, true, true, false] => {
+                Handler::new::<L<O, V<N, O::A>, V<N, O::B>, V<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [true, true, false, true] => {
+                Handler::new::<L<O, V<N, O::A>, V<N, O::B>, U<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [true, true, false, false] => {
+                Handler::new::<L<O, V<N, O::A>, V<N, O::B>, U<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [true, false, true, true] => {
+                Handler::new::<L<O, V<N, O::A>, U<N, O::B>, V<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [true, false, true, false] => {
+                Handler::new::<L<O, V<N, O::A>, U<N, O::B>, V<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [true, false, false, true] => {
+                Handler::new::<L<O, V<N, O::A>, U<N, O::B>, U<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [true, false, false, false] => {
+                Handler::new::<L<O, V<N, O::A>, U<N, O::B>, U<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [false, true, true, true] => {
+                Handler::new::<L<O, U<N, O::A>, V<N, O::B>, V<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [false, true, true, false] => {
+                Handler::new::<L<O, U<N, O::A>, V<N, O::B>, V<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [false, true, false, true] => {
+                Handler::new::<L<O, U<N, O::A>, V<N, O::B>, U<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [false, true, false, false] => {
+                Handler::new::<L<O, U<N, O::A>, V<N, O::B>, U<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [false, false, true, true] => {
+                Handler::new::<L<O, U<N, O::A>, U<N, O::B>, V<N, O::C>, V<N, O::E>>>(tier)
+            }
+            [false, false, true, false] => {
+                Handler::new::<L<O, U<N, O::A>, U<N, O::B>, V<N, O::C>, U<N, O::E>>>(tier)
+            }
+            [false, false, false, true] => {
+                Handler::new::<L<O, U<N, O::A>, U<N, O::B>, U<N, O::C>, V<N, O::E>>>(tier)
+            }
+            _ => Handler::plain::<QuaternaryUniform<O>>(),
         }
     }
 }
@@ -141,6 +194,40 @@ impl<N: Number, O: Ternary<N>> Step<N> for TernaryUniform<O> {
         let b = uniform::<N, O::B>(state, instr.b);
         let c = uniform::<N, O::C>(state, instr.c);
         set_uniform::<N, O::D>(state, instr.d, O::eval(a, b, c));
+    }
+}
+
+struct QuaternaryLanes<O, A, B, C, E>(PhantomData<(O, A, B, C, E)>);
+
+impl<N, O, A, B, C, E> Step<N> for QuaternaryLanes<O, A, B, C, E>
+where
+    N: Number,
+    O: Quaternary<N>,
+    A: Source<N, O::A>,
+    B: Source<N, O::B>,
+    C: Source<N, O::C>,
+    E: Source<N, O::E>,
+{
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        let a = A::open(state, instr.a);
+        let b = B::open(state, instr.b);
+        let c = C::open(state, instr.c);
+        let e = E::open(state, instr.e);
+        map4::<N, O::A, O::B, O::C, O::E, O::D, _, _, _, _>(state, instr.d, a, b, c, e, O::eval);
+    }
+}
+
+struct QuaternaryUniform<O>(PhantomData<O>);
+
+impl<N: Number, O: Quaternary<N>> Step<N> for QuaternaryUniform<O> {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        let a = uniform::<N, O::A>(state, instr.a);
+        let b = uniform::<N, O::B>(state, instr.b);
+        let c = uniform::<N, O::C>(state, instr.c);
+        let e = uniform::<N, O::E>(state, instr.e);
+        set_uniform::<N, O::D>(state, instr.d, O::eval(a, b, c, e));
     }
 }
 

@@ -38,6 +38,11 @@ impl Executor {
     /// texels of a 4096² image, and minutes rather than hours of work.
     pub const DEFAULT_MAX_TRIPS: u32 = 1 << 24;
 
+    /// Default for [`Executor::with_lanes`]: enough to make calling an
+    /// instruction cheap beside its work, and the registers of most kernels
+    /// still fit a core's nearest cache.
+    pub const DEFAULT_LANES: u32 = 128;
+
     /// An executor with a number of threads; 0 for one per processor.
     ///
     /// # Errors
@@ -53,7 +58,7 @@ impl Executor {
         Ok(Self {
             pool,
             tier: Tier::best(),
-            batch: LANES as u32,
+            batch: Self::DEFAULT_LANES,
             max_trips: Self::DEFAULT_MAX_TRIPS,
             profile: false,
         })

@@ -192,6 +192,40 @@ pub(super) fn map3<N, CA, CB, CC, CD, A, B, C>(
     });
 }
 
+/// `d = f(a, b, c, e)`, lane by lane.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+pub(super) fn map4<N, CA, CB, CC, CE, CD, A, B, C, E>(
+    state: &mut State<'_, N>,
+    d: u16,
+    a: A,
+    b: B,
+    c: C,
+    e: E,
+    f: impl Fn(CA::Lane, CB::Lane, CC::Lane, CE::Lane) -> CD::Lane,
+) where
+    N: Number,
+    CA: ClassOf<N>,
+    CB: ClassOf<N>,
+    CC: ClassOf<N>,
+    CE: ClassOf<N>,
+    CD: ClassOf<N>,
+    A: Source<N, CA>,
+    B: Source<N, CB>,
+    C: Source<N, CC>,
+    E: Source<N, CE>,
+{
+    blocks!(state, CD, d, |entry, lane, _old| {
+        let (a, b) = (a.block(entry, lane), b.block(entry, lane));
+        let (c, e) = (c.block(entry, lane), e.block(entry, lane));
+        let mut new = [CD::Lane::default(); BLOCK];
+        for k in 0..BLOCK {
+            new[k] = f(a[k], b[k], c[k], e[k]);
+        }
+        new
+    });
+}
+
 /// `d = f(d, a, b)`, lane by lane.
 #[inline(always)]
 pub(super) fn update2<N, CA, CB, CD, A, B>(

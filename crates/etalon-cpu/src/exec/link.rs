@@ -18,6 +18,8 @@ pub(super) struct Instr {
     pub(super) b: u16,
     /// Third operand, or the mask of a copy.
     pub(super) c: u16,
+    /// Fourth operand.
+    pub(super) e: u16,
     /// Index in [`Code::insts`].
     pub(super) index: u32,
 }
@@ -48,6 +50,7 @@ impl<N: Number> Linked<N> {
                     a: operand(0),
                     b: operand(1),
                     c: inst.mask.map_or_else(|| operand(2), |mask| mask.number),
+                    e: operand(3),
                     index: index as u32,
                 };
                 (handler(inst, tier), instr)

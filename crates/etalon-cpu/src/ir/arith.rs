@@ -35,12 +35,28 @@ pub(crate) trait Ternary<N: Number> {
     fn eval(a: Lane<N, Self::A>, b: Lane<N, Self::B>, c: Lane<N, Self::C>) -> Lane<N, Self::D>;
 }
 
+/// Meaning of an instruction with four operands.
+pub(crate) trait Quaternary<N: Number> {
+    type A: ClassOf<N>;
+    type B: ClassOf<N>;
+    type C: ClassOf<N>;
+    type E: ClassOf<N>;
+    type D: ClassOf<N>;
+    fn eval(
+        a: Lane<N, Self::A>,
+        b: Lane<N, Self::B>,
+        c: Lane<N, Self::C>,
+        e: Lane<N, Self::E>,
+    ) -> Lane<N, Self::D>;
+}
+
 /// Passed every instruction's meaning by [`Arith::visit`].
 pub(crate) trait Visitor<N: Number> {
     type Output;
     fn unary<O: Unary<N> + 'static>(self) -> Self::Output;
     fn binary<O: Binary<N> + 'static>(self) -> Self::Output;
     fn ternary<O: Ternary<N> + 'static>(self) -> Self::Output;
+    fn quaternary<O: Quaternary<N> + 'static>(self) -> Self::Output;
 }
 
 macro_rules! instructions {
@@ -76,6 +92,7 @@ macro_rules! instructions {
     (@visit $visitor:ident $name:ident $a:ident) => { $visitor.unary::<meaning::$name>() };
     (@visit $visitor:ident $name:ident $a:ident $b:ident) => { $visitor.binary::<meaning::$name>() };
     (@visit $visitor:ident $name:ident $a:ident $b:ident $c:ident) => { $visitor.ternary::<meaning::$name>() };
+    (@visit $visitor:ident $name:ident $a:ident $b:ident $c:ident $e:ident) => { $visitor.quaternary::<meaning::$name>() };
     (@meaning $name:ident ($a:ident: $ca:ident) -> $result:ident = $body:expr) => {
         impl<N: Number> Unary<N> for $name {
             type A = $ca;
@@ -101,6 +118,17 @@ macro_rules! instructions {
             type D = $result;
             #[inline(always)]
             fn eval($a: Lane<N, $ca>, $b: Lane<N, $cb>, $c: Lane<N, $cc>) -> Lane<N, $result> { $body }
+        }
+    };
+    (@meaning $name:ident ($a:ident: $ca:ident, $b:ident: $cb:ident, $c:ident: $cc:ident, $e:ident: $ce:ident) -> $result:ident = $body:expr) => {
+        impl<N: Number> Quaternary<N> for $name {
+            type A = $ca;
+            type B = $cb;
+            type C = $cc;
+            type E = $ce;
+            type D = $result;
+            #[inline(always)]
+            fn eval($a: Lane<N, $ca>, $b: Lane<N, $cb>, $c: Lane<N, $cc>, $e: Lane<N, $ce>) -> Lane<N, $result> { $body }
         }
     };
 }
@@ -197,6 +225,38 @@ instructions! {
     PopCount "popcount" (a: Int) -> Int = a.count_ones();
     Reverse "reverse" (a: Int) -> Int = a.reverse_bits();
     SelectI "select.i" (c: Int, a: Int, b: Int) -> Int = (a & c) | (b & !c);
+
+    // Superinstructions: what `lower::fuse` makes of others that follow each
+    // other. Each rounds wherever those do.
+    ClampF "clamp.f" (a: Float, b: Float, c: Float) -> Float = a.max(b).min(c);
+    Max3F "max3.f" (a: Float, b: Float, c: Float) -> Float = a.max(b).max(c);
+    Add3F "add3.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).add(c);
+    MulMinF "mulmin.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).min(c);
+    AddMaxF "addmax.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).max(c);
+    AddMulF "addmul.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).mul(c);
+    SubMulByF "submulby.f" (a: Float, b: Float, c: Float) -> Float = a.sub(b).mul(c);
+    MulMulAddF "mulmuladd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = c.mul(e).add(a.mul(b));
+    MulAddAddF "muladdadd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = a.mul(b).add(c).add(e);
+    SelectMulF "selectmul.f" (a: Float, b: Float, c: Int, e: Float) -> Float = N::select(c, a.mul(b), e);
+    ClampS "clamp.s" (a: Int, b: Int, c: Int) -> Int = s(a).max(s(b)).min(s(c)) as u32;
+    ShrAnd "shrand" (a: Int, b: Int, c: Int) -> Int = (a >> (b & 31)) & c;
+    AndOr "andor" (a: Int, b: Int, c: Int) -> Int = (a & b) | c;
+    Add3I "add3.i" (a: Int, b: Int, c: Int) -> Int = a.wrapping_add(b).wrapping_add(c);
+    // `a`, but 0 if it is above `b`, and at most `c`.
+    CapU "cap.u" (a: Int, b: Int, c: Int) -> Int = (a & !mask(a > b)).min(c);
+    ZeroAboveU "zeroabove.u" (a: Int, b: Int) -> Int = a & !mask(a > b);
+    CapUToBits "f.cap.u" (a: Int, b: Int, c: Int) -> Float = N::from_f32(f32::from_bits((a & !mask(a > b)).min(c)));
+    CapBits "f.cap.f" (a: Float, b: Int, c: Int) -> Float = N::from_f32(f32::from_bits({
+        let bits = a.to_f32().to_bits();
+        (bits & !mask(bits > b)).min(c)
+    }));
+    EqAnd "eqand" (a: Int, b: Int, c: Int) -> Int = mask(a & b == c);
+    NeAnd "neand" (a: Int, b: Int, c: Int) -> Int = mask(a & b != c);
+    EqAndBits "eqand.f" (a: Float, b: Int, c: Int) -> Int = mask(a.to_f32().to_bits() & b == c);
+    NeAndBits "neand.f" (a: Float, b: Int, c: Int) -> Int = mask(a.to_f32().to_bits() & b != c);
+    AndBits "and.f" (a: Float, b: Int) -> Int = a.to_f32().to_bits() & b;
+    LtAnd "ltand.f" (a: Float, b: Float, c: Int) -> Int = mask(a.lt(b)) & c;
+    LeAnd "leand.f" (a: Float, b: Float, c: Int) -> Int = mask(a.le(b)) & c;
 
     // Between the classes.
     FToS "s.from.f" (a: Float) -> Int = a.to_i32() as u32;

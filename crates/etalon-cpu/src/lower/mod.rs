@@ -19,7 +19,7 @@ pub(crate) fn lower(mut tree: Tree, partial: bool) -> Flat {
     liveness::prune(&mut tree);
     let uniformity = uniform::analyse(&tree);
     let mut flat = flatten::flatten(&tree, &uniformity, partial);
-    fuse::multiply_add(&mut flat);
+    fuse::superinstructions(&mut flat);
     coalesce::coalesce(&mut flat);
     flat
 }

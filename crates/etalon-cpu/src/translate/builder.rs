@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashMap};
 use naga::Span;
 
 use super::Fail;
-use crate::ir::arith::{Binary, ClassOf, Ternary, Unary, Visitor};
+use crate::ir::arith::{Binary, ClassOf, Quaternary, Ternary, Unary, Visitor};
 use crate::ir::{Arith, Class, Inst, Node, Op, Origin, ScopeId, Tree, Value, ValueInfo, Variable};
 
 /// Most nodes in a program: inlining must not run away.
@@ -51,6 +51,8 @@ pub(super) struct Builder {
     levels: Vec<Level>,
     prologue_numbering: Numbering,
     constants: HashMap<(Class, u32), Value>,
+    /// What computed each value.
+    computed: HashMap<Value, (Arith, Vec<Value>)>,
     /// The value each variable is known to have at this point.
     known: Vec<Option<Value>>,
     node_count: u64,
@@ -66,6 +68,7 @@ impl Builder {
             levels: vec![Level::default()],
             prologue_numbering: HashMap::new(),
             constants: HashMap::new(),
+            computed: HashMap::new(),
             known: Vec::new(),
             node_count: 0,
             left: BTreeSet::new(),
@@ -156,12 +159,17 @@ impl Builder {
             let folded = op.visit::<f32, _>(Fold { bits: &bits });
             return self.constant(op.result(), folded);
         }
-        self.op(Op::Arith(op), operands, &[op.result()])[0]
+        let value = self.op(Op::Arith(op), operands, &[op.result()])[0];
+        self.computed.insert(value, (op, operands.to_vec()));
+        value
     }
 
     /// Identities that hold for every operand, NaN and -0 included.
-    fn simplify(&self, op: Arith, operands: &[Value]) -> Option<Value> {
+    fn simplify(&mut self, op: Arith, operands: &[Value]) -> Option<Value> {
         let bits = |i: usize| operands.get(i).and_then(|&v| self.constant_bits(v));
+        if op == Arith::Not {
+            return self.negate(operands[0]);
+        }
         match op {
             Arith::SelectF | Arith::SelectI => match bits(0) {
                 Some(TRUE) => Some(operands[1]),
@@ -192,6 +200,29 @@ impl Builder {
         }
     }
 
+    /// The complement of something whose complement has an instruction.
+    fn negate(&mut self, value: Value) -> Option<Value> {
+        let (op, operands) = self.computed.get(&value)?;
+        let (opposite, swap) = match op {
+            Arith::Not => return operands.first().copied(),
+            Arith::EqI => (Arith::NeI, false),
+            Arith::NeI => (Arith::EqI, false),
+            Arith::LtU => (Arith::LeU, true),
+            Arith::LeU => (Arith::LtU, true),
+            Arith::LtS => (Arith::LeS, true),
+            Arith::LeS => (Arith::LtS, true),
+            Arith::EqF => (Arith::NeF, false),
+            Arith::NeF => (Arith::EqF, false),
+            // With a NaN neither `a < b` nor `b <= a`.
+            _ => return None,
+        };
+        let mut operands = operands.clone();
+        if swap {
+            operands.reverse();
+        }
+        Some(self.arith(opposite, &operands))
+    }
+
     /// `condition ? yes : no`.
     pub(super) fn select(&mut self, condition: Value, yes: Value, no: Value) -> Value {
         if self.class(yes) == Class::Float {
@@ -203,6 +234,11 @@ impl Builder {
             (Some(TRUE), Some(FALSE)) => condition,
             (Some(TRUE), _) => self.arith(Arith::Or, &[condition, no]),
             (_, Some(FALSE)) => self.arith(Arith::And, &[condition, yes]),
+            (_, Some(TRUE)) => {
+                let not = self.arith(Arith::Not, &[condition]);
+                self.arith(Arith::Or, &[not, yes])
+            }
+            (Some(FALSE), _) => self.arith(Arith::AndNot, &[no, condition]),
             _ => self.arith(Arith::SelectI, &[condition, yes, no]),
         }
     }
@@ -523,6 +559,15 @@ impl Visitor<f32> for Fold<'_> {
         <O::D as ClassOf<f32>>::to_bits(O::eval(
             <O::A as ClassOf<f32>>::from_bits(self.bits[0]),
             <O::B as ClassOf<f32>>::from_bits(self.bits[1]),
+        ))
+    }
+
+    fn quaternary<O: Quaternary<f32>>(self) -> u32 {
+        <O::D as ClassOf<f32>>::to_bits(O::eval(
+            <O::A as ClassOf<f32>>::from_bits(self.bits[0]),
+            <O::B as ClassOf<f32>>::from_bits(self.bits[1]),
+            <O::C as ClassOf<f32>>::from_bits(self.bits[2]),
+            <O::E as ClassOf<f32>>::from_bits(self.bits[3]),
         ))
     }
 

@@ -1,5 +1,8 @@
 //! What instruction sets have that compilers do not find by themselves.
 
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU32, AtomicU64};
+
 use super::lanes::BLOCK;
 use crate::num::{f16_to_f32, f32_to_f16};
 
@@ -11,6 +14,34 @@ use crate::num::{f16_to_f32, f32_to_f16};
 /// Functions of a tier may be called only where the processor has its
 /// instructions: from handlers that [`super::tier`] made for that tier.
 pub(crate) unsafe trait Isa: 'static {
+    /// `base[index]`, each word read at once.
+    ///
+    /// # Safety
+    /// All indices are below 2^31 and inside of what `base` points to.
+    #[inline(always)]
+    unsafe fn gather4(base: *const u32, index: [u32; BLOCK]) -> [u32; BLOCK] {
+        let mut words = [0; BLOCK];
+        for k in 0..BLOCK {
+            // SAFETY: the caller's promise. Others may write the word.
+            words[k] = unsafe { (*base.add(index[k] as usize).cast::<AtomicU32>()).load(Relaxed) };
+        }
+        words
+    }
+
+    /// `base[index]`, each word read at once.
+    ///
+    /// # Safety
+    /// As for [`Isa::gather4`].
+    #[inline(always)]
+    unsafe fn gather8(base: *const u64, index: [u32; BLOCK]) -> [u64; BLOCK] {
+        let mut words = [0; BLOCK];
+        for k in 0..BLOCK {
+            // SAFETY: as above.
+            words[k] = unsafe { (*base.add(index[k] as usize).cast::<AtomicU64>()).load(Relaxed) };
+        }
+        words
+    }
+
     /// The values of the binary16 in the low halves.
     #[inline(always)]
     fn from_halves(bits: [u32; BLOCK]) -> [f32; BLOCK] {
@@ -86,7 +117,30 @@ mod x86 {
     pub(crate) struct Avx512;
 
     // SAFETY: AVX-512 F, which the tier has.
+    //
+    // Gathers read each word whole, as an atomic load does: where a kernel races
+    // with itself, a lane gets the old or the new word.
     unsafe impl Isa for Avx512 {
+        #[inline(always)]
+        unsafe fn gather4(base: *const u32, index: [u32; BLOCK]) -> [u32; BLOCK] {
+            // SAFETY: as for AVX2, and the caller's promise.
+            unsafe {
+                let index: __m512i = transmute(index);
+                transmute(_mm512_i32gather_epi32::<4>(index, base.cast()))
+            }
+        }
+
+        #[inline(always)]
+        unsafe fn gather8(base: *const u64, index: [u32; BLOCK]) -> [u64; BLOCK] {
+            // SAFETY: as above.
+            unsafe {
+                let [low, high]: [__m256i; 2] = transmute(index);
+                let low = _mm512_i32gather_epi64::<8>(low, base.cast());
+                let high = _mm512_i32gather_epi64::<8>(high, base.cast());
+                transmute([low, high])
+            }
+        }
+
         #[inline(always)]
         fn from_halves(bits: [u32; BLOCK]) -> [f32; BLOCK] {
             // SAFETY: as for AVX2.

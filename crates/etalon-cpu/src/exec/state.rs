@@ -139,9 +139,14 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn bits<const K: usize>(&self, slot: Slot, chunk: usize) -> [u32; K] {
         match slot.class {
             Class::Int => self.ints(slot, chunk),
-            Class::Float => self
-                .floats::<K>(slot, chunk)
-                .map(|lane| lane.to_f32().to_bits()),
+            Class::Float => {
+                let floats = self.floats::<K>(slot, chunk);
+                let mut bits = [0; K];
+                for k in 0..K {
+                    bits[k] = floats[k].to_f32().to_bits();
+                }
+                bits
+            }
         }
     }
 
@@ -169,11 +174,13 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn set_bits<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[u32; K]) {
         match slot.class {
             Class::Int => self.set_ints(slot, chunk, lanes),
-            Class::Float => self.set_floats(
-                slot,
-                chunk,
-                &lanes.map(|bits| N::from_f32(f32::from_bits(bits))),
-            ),
+            Class::Float => {
+                let mut floats = [N::default(); K];
+                for k in 0..K {
+                    floats[k] = N::from_f32(f32::from_bits(lanes[k]));
+                }
+                self.set_floats(slot, chunk, &floats);
+            }
         }
     }
 
@@ -197,7 +204,10 @@ impl<'a, N: Number> State<'a, N> {
     }
 }
 
+/// The first `K` lanes, which is all or one.
 #[inline(always)]
-fn first<T: Copy, const K: usize>(lanes: &[T; LANES]) -> [T; K] {
-    std::array::from_fn(|k| lanes[k])
+fn first<T: Copy + Default, const K: usize>(lanes: &[T; LANES]) -> [T; K] {
+    let mut first = [T::default(); K];
+    first.copy_from_slice(&lanes[..K]);
+    first
 }

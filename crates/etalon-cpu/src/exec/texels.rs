@@ -68,6 +68,32 @@ fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] 
     bits
 }
 
+/// Loops over blocks of lanes with gathers where all indices allow that.
+macro_rules! gathered {
+    ($name:ident, $atomic:ty, $bits:ty, $gather:ident) => {
+        /// [`load`] by the instruction set's gathers.
+        #[inline(always)]
+        fn $name<I: Isa, const K: usize>(words: &[$atomic], index: &[u32; K]) -> [$bits; K] {
+            // Gathers take signed indices.
+            if K % BLOCK != 0 || words.len() > i32::MAX as usize || !all_inside(words, index, 1) {
+                return load(words, index);
+            }
+            let mut bits = [0; K];
+            let (from, _) = index.as_chunks::<BLOCK>();
+            let (to, _) = bits.as_chunks_mut::<BLOCK>();
+            for (index, bits) in from.iter().zip(to) {
+                // SAFETY: all indices were seen to be inside, and atomics are
+                // laid out as what they hold.
+                *bits = unsafe { I::$gather(words.as_ptr().cast(), *index) };
+            }
+            bits
+        }
+    };
+}
+
+gathered!(load4, AtomicU32, u32, gather4);
+gathered!(load8, AtomicU64, u64, gather8);
+
 /// [`load`] where a texel has two words.
 #[inline(always)]
 fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K]; 2] {
@@ -181,7 +207,7 @@ pub(super) fn fetch<I: Isa, const K: usize>(
     // The channels that the loops below decode; the others are 0, 0, 1.
     let decoded = match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            let word = load(texels, index);
+            let word = load8::<I, K>(texels, index);
             halves!(wanted, out,
                 0: |k| word[k] as u32,
                 1: |k| word[k] as u32 >> 16,
@@ -190,7 +216,7 @@ pub(super) fn fetch<I: Isa, const K: usize>(
             4
         }
         (Texels::B4(texels), Format::Rgba8Unorm) => {
-            let word = load(texels, index);
+            let word = load4::<I, K>(texels, index);
             channels!(wanted, out,
                 0: |k| unorm8(word[k]),
                 1: |k| unorm8(word[k] >> 8),
@@ -203,12 +229,12 @@ pub(super) fn fetch<I: Isa, const K: usize>(
             Format::R32Float | Format::Depth32Float | Format::R32Uint | Format::R32Sint,
         ) => {
             if wanted[0] {
-                out[0] = load(texels, index);
+                out[0] = load4::<I, K>(texels, index);
             }
             1
         }
         (Texels::B4(texels), Format::Rg16Float) => {
-            let word = load(texels, index);
+            let word = load4::<I, K>(texels, index);
             halves!(wanted, out, 0: |k| word[k], 1: |k| word[k] >> 16);
             2
         }
@@ -218,7 +244,7 @@ pub(super) fn fetch<I: Isa, const K: usize>(
             1
         }
         (Texels::B8(texels), Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint) => {
-            let word = load(texels, index);
+            let word = load8::<I, K>(texels, index);
             channels!(wanted, out, 0: |k| word[k] as u32, 1: |k| (word[k] >> 32) as u32);
             2
         }
@@ -277,7 +303,15 @@ pub(super) fn put<I: Isa, const K: usize>(
     let format = texture.desc().format;
     match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            let [r, g, b, a] = [0, 1, 2, 3].map(|c| to_halves::<I, K>(&channels[c]));
+            // No closure here: it would not be compiled for the instruction set.
+            let (r, g) = (
+                to_halves::<I, K>(&channels[0]),
+                to_halves::<I, K>(&channels[1]),
+            );
+            let (b, a) = (
+                to_halves::<I, K>(&channels[2]),
+                to_halves::<I, K>(&channels[3]),
+            );
             let mut word = [0; K];
             for k in 0..K {
                 let (low, high) = (r[k] | g[k] << 16, b[k] | a[k] << 16);

@@ -306,3 +306,31 @@ impl FromStr for Size {
             })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn subjects_have_names_of_their_own_and_are_found_by_them() {
+        let names = names();
+        for (index, name) in names.iter().enumerate() {
+            assert!(!names[..index].contains(name), "{name}");
+            assert_eq!(subject(name).unwrap().name, *name);
+        }
+        assert!(names.contains(&"chain"));
+        assert_eq!(subjects().len() + 1, names.len());
+        let error = subject("nothing").unwrap_err().to_string();
+        assert!(error.contains("`nothing`") && error.contains("bilinear"));
+    }
+
+    #[test]
+    fn sizes_are_read() {
+        let size: Size = "64x36".parse().unwrap();
+        assert_eq!((size.width, size.height), (64, 36));
+        assert_eq!(size.to_string(), "64x36");
+        for text in ["", "64", "0x1", "1x0", "1x2x3", "-1x4"] {
+            assert!(text.parse::<Size>().is_err(), "{text}");
+        }
+    }
+}

@@ -8,7 +8,9 @@ pub fn heading(row: &Row) -> String {
     let mut line = format!("{:<34}", "kernel (dispatches)");
     let mut under = format!("{:<34}", "");
     for (index, column) in row.columns.iter().enumerate() {
-        let name: String = column.executor.chars().take(18).collect();
+        // Devices have long names: "llvmpipe (LLVM 15.0.6, 256 bits)".
+        let name = column.executor.split(" (").next().unwrap_or_default();
+        let name: String = name.chars().take(18).collect();
         if index == 0 && is_reference(row) {
             line += &format!(" | {name:<18}");
             under += &format!(" | {:>8} {:>9}", "wall", "cpu ms");
@@ -68,4 +70,71 @@ pub fn line(row: &Row) -> String {
         }
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use etalon_core::kernel::Arithmetic;
+
+    use super::*;
+    use crate::compare::{Column, Times};
+    use crate::subjects::Targets;
+
+    fn column(executor: &str, rounds: &[(f64, f64)]) -> Column {
+        Column {
+            executor: executor.to_owned(),
+            rounds: rounds
+                .iter()
+                .map(|&(wall, processor)| Times { wall, processor })
+                .collect(),
+        }
+    }
+
+    fn row(columns: Vec<Column>) -> Row {
+        Row {
+            subject: "ssr".to_owned(),
+            kernel: "ssr/march".to_owned(),
+            dispatches: 1,
+            arithmetic: Arithmetic::Strict,
+            targets: Targets {
+                baseline: 1.1,
+                avx2: 0.65,
+                avx512: 0.5,
+            },
+            repetitions: 1,
+            columns,
+        }
+    }
+
+    #[test]
+    fn ratios_are_of_rounds_and_marked_over_their_target() {
+        // The third round met something else on both.
+        let reference = column("driver", &[(10.0, 20.0), (10.0, 20.0), (40.0, 80.0)]);
+        let good = column("avx512", &[(4.0, 8.0), (5.0, 10.0), (19.0, 38.0)]);
+        let bad = column("avx2", &[(7.0, 12.0), (7.0, 12.0), (28.0, 48.0)]);
+        assert_eq!(good.median().wall, 5.0);
+        assert!((good.ratio(&reference).wall - 0.475).abs() < 1e-12);
+        let row = row(vec![reference, bad, good]);
+        let line = line(&row);
+        let cells: Vec<&str> = line.split(" | ").collect();
+        assert_eq!(cells.len(), 4);
+        assert_eq!(cells[0].trim(), "strict ssr/march (1)");
+        assert_eq!(
+            cells[2].split_whitespace().collect::<Vec<_>>(),
+            ["7.000", "12.000", "0.70!", "0.60"]
+        );
+        assert_eq!(
+            cells[3].split_whitespace().collect::<Vec<_>>(),
+            ["5.000", "10.000", "0.47", "0.47"]
+        );
+        assert!(heading(&row).contains("driver"));
+    }
+
+    #[test]
+    fn without_a_reference_there_are_no_ratios() {
+        let row = row(vec![column("avx2", &[(7.0, 12.0)])]);
+        assert!(!line(&row).contains('!'));
+        assert_eq!(line(&row).split(" | ").count(), 2);
+        assert_eq!(heading(&row).lines().count(), 2);
+    }
 }

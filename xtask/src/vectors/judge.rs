@@ -1,5 +1,6 @@
 //! Whether a function uses the vectors it could use.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
@@ -111,14 +112,9 @@ pub fn judge(function: &Function, tier: Tier) -> Vec<Finding> {
             scalar.iter().map(|one| one.mnemonic.as_str()).collect(),
         );
     }
-    let calls: Vec<_> = instructions
-        .iter()
-        .filter(|one| one.is_call() && !one.symbols.iter().any(|symbol| is_check(symbol)))
-        .map(|one| {
-            one.symbols
-                .first()
-                .map_or("through a pointer", String::as_str)
-        })
+    let calls: Vec<_> = called(instructions)
+        .into_iter()
+        .filter(|symbol| !is_check(symbol))
         .collect();
     if !calls.is_empty() {
         find(Fault::Calls, calls);
@@ -142,6 +138,28 @@ pub fn judge(function: &Function, tier: Tier) -> Vec<Finding> {
         find(Fault::Lanes, lanes);
     }
     findings
+}
+
+/// The functions called, as far as they have names: calls through a register
+/// have that of what was last loaded into it.
+fn called(instructions: &[Instruction]) -> Vec<&str> {
+    let mut loaded: BTreeMap<&str, &str> = BTreeMap::new();
+    let mut calls = Vec::new();
+    for one in instructions {
+        let symbol = one.symbols.first().map(String::as_str);
+        if one.is_call() {
+            let register = loaded.get(one.operands.as_str()).copied();
+            calls.push(symbol.or(register).unwrap_or("through a pointer"));
+        } else if one.mnemonic == "mov"
+            && let Some((register, _)) = one.operands.split_once(',')
+        {
+            match symbol {
+                Some(symbol) => loaded.insert(register, symbol),
+                None => loaded.remove(register),
+            };
+        }
+    }
+    calls
 }
 
 /// Whether an instruction uses a register of the tier's full width.
@@ -231,6 +249,13 @@ mod tests {
             [Fault::Calls]
         );
         assert_eq!(of("  13:\tcall   r12\n"), [Fault::Calls]);
+        let through = |symbol: &str| {
+            of(&format!(
+                "  13:\tmov    r12,QWORD PTR [rip+0x0]\n\t\t\t16: R_X86_64_GOTPCREL\t{symbol}-0x4\n  1a:\tcall   r12\n"
+            ))
+        };
+        assert_eq!(through("sin"), [Fault::Calls]);
+        assert_eq!(through("core::panicking::panic"), []);
         assert_eq!(
             of("  13:\tadd    eax,1\n  16:\tjne    13 <f+0x13>\n"),
             [Fault::Loops]

@@ -132,7 +132,7 @@ fn a_changed_input_changes_the_outcome() {
         .iter()
         .map(|(name, image)| {
             let mut image = (*image).clone();
-            let middle = image.bytes.len() / 2 & !7;
+            let middle = (image.bytes.len() / 2) & !7;
             // A half float of 64 in the first channel.
             image.bytes[middle..middle + 2].copy_from_slice(&[0x00, 0x54]);
             (name.to_string(), image)

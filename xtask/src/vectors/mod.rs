@@ -5,7 +5,8 @@
 //! it has not, so this looks: every handler of the AVX2 and AVX-512 tiers must
 //! use their full width, have no scalar floating-point arithmetic, no calls and
 //! no loops lane by lane. What cannot be so is listed in `vectors.json` with
-//! its reason; hot handlers are listed there as well and must exist.
+//! its reason. Hot handlers are listed there as well and must exist, and so are
+//! instructions that handlers with many paths must have for the common ones.
 
 pub mod disassembly;
 pub mod judge;
@@ -68,8 +69,24 @@ pub enum VectorsError {
 pub struct Rules {
     /// Handlers that must exist in both tiers, by the beginning of their names.
     pub hot: Vec<String>,
+    /// Instructions that some must have: their paths for common cases.
+    pub needs: Vec<Need>,
     /// What is allowed to some.
     pub exceptions: Vec<Exception>,
+}
+
+/// What a handler must have.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Need {
+    /// The beginning of its name.
+    pub handler: String,
+    /// In which tiers.
+    pub tiers: Vec<Tier>,
+    /// Beginnings of mnemonics, of each of which it must have one.
+    pub instructions: Vec<String>,
+    /// What for.
+    pub reason: String,
 }
 
 /// What is allowed to a handler.
@@ -93,7 +110,7 @@ pub struct Violation {
     pub handler: String,
     /// In which tier.
     pub tier: Tier,
-    /// What is wrong; none if it does not exist.
+    /// What is wrong; none if it, or what it needs, does not exist.
     pub fault: Option<Fault>,
     /// What shows it.
     pub evidence: String,
@@ -170,6 +187,35 @@ pub fn check(functions: &[Function], rules: &Rules) -> (Vec<Violation>, Vec<Stri
             if !exists {
                 violations.push(Violation {
                     handler: hot.clone(),
+                    tier,
+                    fault: None,
+                    evidence: "there is no such handler".to_owned(),
+                });
+            }
+        }
+    }
+    for need in &rules.needs {
+        for &tier in &need.tiers {
+            let mut named = handlers
+                .iter()
+                .filter(|((its, name), _)| *its == tier && name.starts_with(&need.handler));
+            for wanted in &need.instructions {
+                let has = |function: &Function| {
+                    let mut mnemonics = function.instructions.iter().map(|one| &one.mnemonic);
+                    mnemonics.any(|mnemonic| mnemonic.starts_with(wanted))
+                };
+                if !named.clone().any(|(_, function)| has(function)) {
+                    violations.push(Violation {
+                        handler: need.handler.clone(),
+                        tier,
+                        fault: None,
+                        evidence: format!("no {wanted} in it ({})", need.reason),
+                    });
+                }
+            }
+            if named.next().is_none() {
+                violations.push(Violation {
+                    handler: need.handler.clone(),
                     tier,
                     fault: None,
                     evidence: "there is no such handler".to_owned(),
@@ -325,6 +371,9 @@ mod tests {
     fn the_rules_can_be_read_and_give_reasons() {
         let rules: Rules = serde_json::from_str(RULES).unwrap();
         assert!(!rules.hot.is_empty());
+        for need in &rules.needs {
+            assert!(!need.reason.is_empty() && !need.instructions.is_empty());
+        }
         for exception in &rules.exceptions {
             assert!(!exception.reason.is_empty() && !exception.allow.is_empty());
             // What is hot has no excuse for the kinds of faults that matter most.
@@ -384,6 +433,12 @@ mod tests {
         let functions = disassemble(&library).unwrap();
         let rules = |exceptions| Rules {
             hot: vec!["Vector".to_owned()],
+            needs: vec![Need {
+                handler: "Vector".to_owned(),
+                tiers: vec![Tier::Avx2],
+                instructions: vec!["vmulps".to_owned()],
+                reason: "to square".to_owned(),
+            }],
             exceptions,
         };
         let (violations, unused) = check(&functions, &rules(Vec::new()));
@@ -405,6 +460,12 @@ mod tests {
         );
         let scalar = |violation: &Violation| violation.fault == Some(Fault::Scalar);
         assert!(violations.iter().any(scalar), "{violations:?}");
+        // What is needed and not there is one.
+        let mut demanding = rules(Vec::new());
+        demanding.needs[0].instructions.push("vpgather".to_owned());
+        let (violations, _) = check(&functions, &demanding);
+        let gather = |violation: &Violation| violation.evidence.contains("no vpgather");
+        assert_eq!(violations.iter().filter(|one| gather(one)).count(), 1);
         // What is allowed is no violation; what nobody needs is named.
         let exception = |handler: &str| Exception {
             handler: handler.to_owned(),

@@ -135,6 +135,11 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
     match inst.op {
         Op::Arith(op) => {
             let varying: Vec<bool> = inst.operands.iter().map(|slot| slot.varying).collect();
+            let op = if tier == Tier::Baseline {
+                op.on_baseline()
+            } else {
+                op
+            };
             op.visit(Select {
                 tier,
                 varying: &varying,

@@ -181,6 +181,11 @@ instructions! {
     AsinhF "asinh.f" (a: Float) -> Float = a.asinh();
     AcoshF "acosh.f" (a: Float) -> Float = a.acosh();
     AtanhF "atanh.f" (a: Float) -> Float = a.atanh();
+    // The same where there is no instruction for it.
+    FloorStepsF "floor.steps.f" (a: Float) -> Float = a.floor_in_steps();
+    CeilStepsF "ceil.steps.f" (a: Float) -> Float = a.ceil_in_steps();
+    TruncStepsF "trunc.steps.f" (a: Float) -> Float = a.trunc_in_steps();
+    RoundStepsF "round.steps.f" (a: Float) -> Float = a.round_in_steps();
     SelectF "select.f" (c: Int, a: Float, b: Float) -> Float = N::select(c, a, b);
 
     // Comparisons; greater is less with the operands exchanged.
@@ -285,6 +290,18 @@ impl Arith {
             | Self::AcoshF
             | Self::AtanhF => 40,
             _ => 1,
+        }
+    }
+
+    /// The instruction to use on the baseline tier: x86 has no rounding to
+    /// integers before SSE4.1, and calling a function for each lane is slow.
+    pub(crate) fn on_baseline(self) -> Self {
+        match self {
+            Self::FloorF => Self::FloorStepsF,
+            Self::CeilF => Self::CeilStepsF,
+            Self::TruncF => Self::TruncStepsF,
+            Self::RoundF => Self::RoundStepsF,
+            other => other,
         }
     }
 

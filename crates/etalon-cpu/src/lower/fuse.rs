@@ -83,11 +83,6 @@ pub(super) fn superinstructions(flat: &mut Flat) {
     let mut fuser = Fuser {
         uses: uses(flat),
         varying: flat.regs.iter().map(|reg| reg.varying).collect(),
-        zero: flat
-            .regs
-            .iter()
-            .map(|reg| reg.constant == Some(0))
-            .collect(),
         written: vec![None; flat.regs.len()],
     };
     for block in &mut flat.blocks {
@@ -99,8 +94,6 @@ struct Fuser {
     /// How often each register is read in the whole program.
     uses: Vec<u32>,
     varying: Vec<bool>,
-    /// Registers that hold the literal zero.
-    zero: Vec<bool>,
     /// Where in the block each register was last written.
     written: Vec<Option<usize>>,
 }
@@ -154,17 +147,17 @@ impl Fuser {
         })
     }
 
-    /// `select(b > k, 0, b)`.
+    /// `select(b, 0, b > k)`, which the translator writes as `b & !(k < b)`.
     fn zero_above(&mut self, block: &Block, outer: &FlatInst) -> Option<(usize, FlatInst)> {
-        let (Op::Arith(Arith::SelectI), &[condition, yes, no]) = (outer.op, &outer.operands[..])
+        let (Op::Arith(Arith::AndNot), &[value, condition]) = (outer.op, &outer.operands[..])
         else {
             return None;
         };
         let at = self.computed(block, condition, Arith::LtU)?;
-        let &[limit, value] = &block.insts[at].operands[..] else {
+        let &[limit, compared] = &block.insts[at].operands[..] else {
             return None;
         };
-        if !self.zero[yes.0 as usize] || value != no {
+        if value != compared {
             return None;
         }
         self.uses[value.0 as usize] -= 1;

@@ -39,6 +39,26 @@ pub(crate) trait Number: Copy + Default + Send + Sync + 'static {
     fn trunc(self) -> Self;
     /// To the nearest integer, ties to even.
     fn round(self) -> Self;
+    /// [`Number::floor`] without an instruction for it.
+    #[inline(always)]
+    fn floor_in_steps(self) -> Self {
+        self.floor()
+    }
+    /// [`Number::ceil`] without an instruction for it.
+    #[inline(always)]
+    fn ceil_in_steps(self) -> Self {
+        self.ceil()
+    }
+    /// [`Number::trunc`] without an instruction for it.
+    #[inline(always)]
+    fn trunc_in_steps(self) -> Self {
+        self.trunc()
+    }
+    /// [`Number::round`] without an instruction for it.
+    #[inline(always)]
+    fn round_in_steps(self) -> Self {
+        self.round()
+    }
     fn sqrt(self) -> Self;
     fn exp(self) -> Self;
     fn exp2(self) -> Self;
@@ -157,6 +177,31 @@ impl Number for f32 {
         self.round_ties_even()
     }
     #[inline(always)]
+    fn floor_in_steps(self) -> Self {
+        let nearest = Number::round_in_steps(self);
+        let above = f32::from_bits(mask(nearest > self) & 1.0_f32.to_bits());
+        with_sign_of(nearest - above, self)
+    }
+    #[inline(always)]
+    fn ceil_in_steps(self) -> Self {
+        let nearest = Number::round_in_steps(self);
+        let below = f32::from_bits(mask(nearest < self) & 1.0_f32.to_bits());
+        with_sign_of(nearest + below, self)
+    }
+    #[inline(always)]
+    fn trunc_in_steps(self) -> Self {
+        let size = Number::abs(self);
+        with_sign_of(Number::floor_in_steps(size), self)
+    }
+    #[inline(always)]
+    fn round_in_steps(self) -> Self {
+        // From here on every number is an integer: the sum rounds to one.
+        const INTEGERS: f32 = 8_388_608.0;
+        let size = Number::abs(self);
+        let nearest = with_sign_of((size + INTEGERS) - INTEGERS, self);
+        Number::select(mask(size < INTEGERS), nearest, self)
+    }
+    #[inline(always)]
     fn sqrt(self) -> Self {
         self.sqrt()
     }
@@ -264,6 +309,13 @@ impl Number for f32 {
     }
 }
 
+/// The magnitude of one number, the sign of another.
+#[inline(always)]
+fn with_sign_of(magnitude: f32, sign: f32) -> f32 {
+    const SIGN: u32 = 0x8000_0000;
+    f32::from_bits((magnitude.to_bits() & !SIGN) | (sign.to_bits() & SIGN))
+}
+
 /// The integer part of `|x|`, at most `u32::MAX`; anything for NaN.
 ///
 /// What `as` does, but as vector code: compilers leave saturating conversions
@@ -284,4 +336,41 @@ fn truncated_magnitude(x: f32) -> u32 {
 #[inline(always)]
 pub(crate) fn mask(condition: bool) -> u32 {
     0_u32.wrapping_sub(u32::from(condition))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Number;
+
+    /// All exponents and signs, halves and their neighbours.
+    #[test]
+    fn rounding_in_steps_is_rounding() {
+        let arbitrary = (0..400_000_u32).map(|i| f32::from_bits(i.wrapping_mul(0x9e37_79b1)));
+        let halves = (-2000..2000).flat_map(|i| {
+            let half = i as f32 / 4.0;
+            [half, half.next_up(), half.next_down(), half * 8192.0]
+        });
+        let special = [
+            0.0,
+            -0.0,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            8_388_607.5,
+            -8_388_607.5,
+        ];
+        for x in arbitrary.chain(halves).chain(special) {
+            let pairs = [
+                (x.floor_in_steps(), x.floor()),
+                (x.ceil_in_steps(), x.ceil()),
+                (x.trunc_in_steps(), x.trunc()),
+                (x.round_in_steps(), x.round_ties_even()),
+            ];
+            for (got, want) in pairs {
+                assert!(
+                    got.to_bits() == want.to_bits() || got.is_nan() && want.is_nan(),
+                    "{x}: {got}, not {want}"
+                );
+            }
+        }
+    }
 }

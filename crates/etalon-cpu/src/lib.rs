@@ -2,8 +2,8 @@
 //!
 //! A kernel's naga module is [translated](Program::from_module) into a tree of
 //! scalar instructions, lowered to blocks of bytecode, and run by an
-//! [`Executor`]: all invocations of a workgroup together, one instruction at a
-//! time, each over 64 lanes with vector instructions. What is the same in all
+//! [`Executor`]: all invocations of a workgroup, or of several, together, one
+//! instruction at a time, each over many lanes with vector instructions. What is the same in all
 //! invocations is computed once. Where invocations part ways, both ways are run
 //! under a mask.
 //!

@@ -1,0 +1,258 @@
+//! Instructions that were joined compute what they computed apart.
+//!
+//! The same kernel twice: once as it is, so that its two instructions become
+//! one, and once with the result in between stored, so that they cannot.
+
+mod common;
+
+use common::*;
+use etalon_cpu::{BoundResource, Executor, Program, Tier};
+
+/// A type, a step, a step on its result `t`, and what the two become.
+struct Pair {
+    ty: &'static str,
+    between: &'static str,
+    first: &'static str,
+    second: &'static str,
+    /// How the instruction is listed.
+    joined: &'static str,
+}
+
+const fn pair(
+    ty: &'static str,
+    between: &'static str,
+    first: &'static str,
+    second: &'static str,
+    joined: &'static str,
+) -> Pair {
+    Pair {
+        ty,
+        between,
+        first,
+        second,
+        joined,
+    }
+}
+
+const PAIRS: &[Pair] = &[
+    pair("f32", "f32", "a * b", "t + c", "muladd.f"),
+    pair("f32", "f32", "a * b", "t - c", "mulsub.f"),
+    pair("f32", "f32", "a * b", "c - t", "submul.f"),
+    pair("f32", "f32", "a * b + c", "t + d", "muladdadd.f"),
+    pair("f32", "f32", "a * b", "c * d + t", "mulmuladd.f"),
+    pair("f32", "f32", "a + b", "t + c", "add3.f"),
+    pair("f32", "f32", "a + b", "c + t", "add3.f"),
+    pair("f32", "f32", "a + b", "t * c", "addmul.f"),
+    pair("f32", "f32", "a - b", "c * t", "submulby.f"),
+    pair("f32", "f32", "max(a, b)", "min(t, c)", "clamp.f"),
+    pair("f32", "f32", "max(a, b)", "max(t, c)", "max3.f"),
+    pair("f32", "f32", "a * b", "min(t, c)", "mulmin.f"),
+    pair("f32", "f32", "a + b", "max(t, c)", "addmax.f"),
+    pair("f32", "f32", "a * b", "select(c, t, d < c)", "selectmul.f"),
+    pair(
+        "f32",
+        "bool",
+        "a < b",
+        "select(a, b, t && bitcast<u32>(c) == bitcast<u32>(d))",
+        "ltand.f",
+    ),
+    pair(
+        "f32",
+        "bool",
+        "a <= b",
+        "select(a, b, t && bitcast<u32>(c) == bitcast<u32>(d))",
+        "leand.f",
+    ),
+    pair("i32", "i32", "max(a, b)", "min(t, c)", "clamp.s"),
+    pair("u32", "u32", "a >> b", "t & c", "shrand"),
+    pair("u32", "u32", "a & b", "t | c", "andor"),
+    pair("u32", "u32", "a + b", "c + t", "add3.i"),
+    pair("u32", "u32", "select(a, 0u, a > b)", "min(t, c)", "cap.u"),
+    pair("u32", "bool", "a > b", "select(a, 0u, t)", "zeroabove.u"),
+    pair("u32", "u32", "a & b", "select(a, b, t == c)", "eqand"),
+    pair("u32", "u32", "a & b", "select(a, b, t != c)", "neand"),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a)",
+        "bitcast<f32>(t & 0x7ffffff0u)",
+        "and.f",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a) & 0x7f800000u",
+        "select(b, c, t == 0x7f800000u)",
+        "eqand.f",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a) & 0x7f800000u",
+        "select(b, c, t != 0x7f800000u)",
+        "neand.f",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "select(bitcast<u32>(a), 0u, bitcast<u32>(a) > 0x7f800000u)",
+        "bitcast<f32>(min(t, 0x477fe000u))",
+        "f.cap.f",
+    ),
+];
+
+const NAMES: [&str; 4] = ["a", "b", "c", "d"];
+
+/// `uniform` has a bit for each operand that is the same in all invocations.
+fn kernel(pair: &Pair, uniform: u32, apart: bool) -> String {
+    let Pair {
+        ty,
+        between,
+        first,
+        second,
+        ..
+    } = pair;
+    let operands: String = NAMES
+        .iter()
+        .enumerate()
+        .map(|(k, name)| {
+            if uniform >> k & 1 == 1 {
+                format!("let {name} = bitcast<{ty}>(data[{}u]);\n", 7 * k + 3)
+            } else {
+                format!(
+                    "let {name} = bitcast<{ty}>(data[(id.x * {}u + {k}u) % 64u]);\n",
+                    2 * k + 3
+                )
+            }
+        })
+        .collect();
+    let stored = match *between {
+        "bool" => "u32(t)",
+        "f32" => "bitcast<u32>(t)",
+        _ => "u32(t)",
+    };
+    let stored = if apart {
+        format!("result[id.x + 256u] = {stored};\n")
+    } else {
+        String::new()
+    };
+    format!(
+        "@group(0) @binding(0) var<storage> data: array<u32, 64>;
+         @group(0) @binding(1) var<storage, read_write> result: array<u32, 512>;
+         @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+             {operands}
+             let t: {between} = {first};
+             {stored}
+             let r: {ty} = {second};
+             result[id.x] = bitcast<u32>(r);
+         }}"
+    )
+}
+
+fn data() -> Vec<u32> {
+    let special = [
+        0.0,
+        -0.0,
+        1.0,
+        -1.0,
+        0.1,
+        3.0,
+        1e-40,
+        -1e-40,
+        f32::MAX,
+        f32::MIN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        65504.0,
+        16_777_216.0,
+        1.000_000_1,
+    ];
+    (0..64_u32)
+        .map(|i| match i % 4 {
+            0 => special[(i / 4) as usize].to_bits(),
+            1 => i,
+            _ => (i * i + 1).wrapping_mul(0x9e37_79b1),
+        })
+        .collect()
+}
+
+fn run(program: &Program, executor: &Executor, data: &[u32]) -> Vec<u32> {
+    let (data, result) = (buffer(data), buffer(&[0; 512]));
+    let bound = [BoundResource::Buffer(&data), BoundResource::Buffer(&result)];
+    let bound = &bound[..program.bindings().len()];
+    program.dispatch(executor, [4, 1, 1], bound).unwrap();
+    words(&result)[..256].to_vec()
+}
+
+#[test]
+fn joined_instructions_compute_what_they_do_apart() {
+    let data = data();
+    let executors: Vec<Executor> = Tier::ALL
+        .into_iter()
+        .filter(|tier| tier.is_available())
+        .flat_map(|tier| [64, 256].map(|lanes| (tier, lanes)))
+        .map(|(tier, lanes)| Executor::new(1).unwrap().with_tier(tier).with_lanes(lanes))
+        .collect();
+    for pair in PAIRS {
+        for uniform in 0..15 {
+            let joined = program(&kernel(pair, uniform, false));
+            let apart = program(&kernel(pair, uniform, true));
+            if uniform == 0 {
+                let has = |program: &Program| {
+                    program
+                        .to_string()
+                        .lines()
+                        .any(|line| line.split_whitespace().any(|word| word == pair.joined))
+                };
+                assert!(has(&joined), "no {} in\n{joined}", pair.joined);
+                assert!(!has(&apart), "{} in\n{apart}", pair.joined);
+            }
+            let mut first = None;
+            for executor in &executors {
+                for program in [&joined, &apart] {
+                    let got = run(program, executor, &data);
+                    let want = first.get_or_insert_with(|| got.clone());
+                    for (i, (got, want)) in got.iter().zip(want.iter()).enumerate() {
+                        let nans = [*got, *want].map(|bits| f32::from_bits(bits).is_nan());
+                        assert!(
+                            got == want || pair.ty == "f32" && nans == [true; 2],
+                            "{}, uniform {uniform:b}, {i}: {got:x}, not {want:x}\n{program}",
+                            pair.joined
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is overwritten between two instructions keeps them apart: the first
+/// reads the loop's `x` before it is doubled, the second after.
+#[test]
+fn operands_that_change_in_between_are_read_in_time() {
+    let wgsl = "
+        @group(0) @binding(0) var<storage> data: array<u32>;
+        @group(0) @binding(1) var<storage, read_write> result: array<u32>;
+        @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+            var x = data[id.x];
+            var sum = 0u;
+            for (var i = 0u; i < 5u + data[id.x] % 3u; i++) {
+                let masked = x & 0xffu;
+                x = x * 2u + 1u;
+                sum += (masked | x) + i;
+            }
+            result[id.x] = sum;
+        }";
+    let data: Vec<u32> = (0..128_u32).map(|i| i.wrapping_mul(0x9e37_79b1)).collect();
+    let got = run_buffers(wgsl, &data, 128, 2);
+    for (&value, got) in data.iter().zip(got) {
+        let (mut x, mut sum) = (value, 0_u32);
+        for i in 0..5 + value % 3 {
+            let masked = x & 0xff;
+            x = x.wrapping_mul(2).wrapping_add(1);
+            sum = sum.wrapping_add((masked | x).wrapping_add(i));
+        }
+        assert_eq!(got, sum);
+    }
+}

@@ -14,10 +14,11 @@
 
 use super::state::State;
 use crate::num::Number;
-use crate::registers::{ClassOf, LANES, Lanes};
+pub(super) use crate::registers::BLOCK;
+use crate::registers::{ClassOf, LANES, Lane};
 
-/// Lanes that a loop handles together.
-pub(super) const BLOCK: usize = 16;
+type LanesOf<L> = <L as Lane>::Lanes;
+type BlockOf<L> = <L as Lane>::Block;
 
 /// An operand of class `C` that loops over lanes read.
 pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
@@ -29,12 +30,12 @@ pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
     /// # Safety
     /// `entry` is a multiple of the files' stride below their end, and `lane` a
     /// multiple of [`BLOCK`] below [`LANES`].
-    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK];
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane>;
 }
 
 /// A register of lanes.
 #[derive(Clone, Copy)]
-pub(super) struct Varying<L>(*const Lanes<L>);
+pub(super) struct Varying<L: Lane>(*const LanesOf<L>);
 
 impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
     #[inline(always)]
@@ -45,13 +46,12 @@ impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
     }
 
     #[inline(always)]
-    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK] {
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane> {
         // SAFETY: the register's number is below the stride (see the module's
-        // documentation), so the block is in the file, which is initialised.
-        unsafe {
-            let lanes = self.0.add(entry).cast::<C::Lane>().add(lane);
-            lanes.cast::<[C::Lane; BLOCK]>().read()
-        }
+        // documentation), so the register is in the file, which is initialised
+        // and which nothing writes while the reference lives.
+        let lanes = unsafe { &*self.0.add(entry) };
+        C::Lane::block(lanes, lane)
     }
 }
 
@@ -70,8 +70,8 @@ impl<N: Number, C: ClassOf<N>> Source<N, C> for Uniform<C::Lane> {
     }
 
     #[inline(always)]
-    unsafe fn block(self, _: usize, _: usize) -> [C::Lane; BLOCK] {
-        [self.0; BLOCK]
+    unsafe fn block(self, _: usize, _: usize) -> BlockOf<C::Lane> {
+        self.0.splat()
     }
 }
 
@@ -90,13 +90,9 @@ macro_rules! blocks {
                 // SAFETY: as in `Varying::block`. Nothing else refers to the
                 // files: what the body reads, it reads by value.
                 unsafe {
-                    let $old = first
-                        .add($entry)
-                        .cast::<<$class as ClassOf<N>>::Lane>()
-                        .add($lane)
-                        .cast::<[<$class as ClassOf<N>>::Lane; BLOCK]>();
+                    let $old = || <$class as ClassOf<N>>::Lane::block(&*first.add($entry), $lane);
                     let new = $body;
-                    $old.write(new);
+                    <$class as ClassOf<N>>::Lane::set_block(&mut *first.add($entry), $lane, new);
                 }
                 $lane += BLOCK;
             }
@@ -125,9 +121,9 @@ pub(super) fn map1<N, CA, CD, A>(
 {
     blocks!(state, CD, d, |entry, lane, _old| {
         let a = a.block(entry, lane);
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k]);
+            CD::Lane::set_in_block(&mut new, k, f(CA::Lane::of_block(&a, k)));
         }
         new
     });
@@ -151,9 +147,10 @@ pub(super) fn map2<N, CA, CB, CD, A, B>(
 {
     blocks!(state, CD, d, |entry, lane, _old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k]);
+            let value = f(CA::Lane::of_block(&a, k), CB::Lane::of_block(&b, k));
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });
@@ -184,9 +181,14 @@ pub(super) fn map3<N, CA, CB, CC, CD, A, B, C>(
             b.block(entry, lane),
             c.block(entry, lane),
         );
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k], c[k]);
+            let value = f(
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+                CC::Lane::of_block(&c, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });
@@ -244,9 +246,14 @@ pub(super) fn update2<N, CA, CB, CD, A, B>(
 {
     blocks!(state, CD, d, |entry, lane, old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
-        let mut new = old.read();
+        let mut new = old();
         for k in 0..BLOCK {
-            new[k] = f(new[k], a[k], b[k]);
+            let value = f(
+                CD::Lane::of_block(&new, k),
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });

@@ -24,6 +24,7 @@ mod state;
 mod texels;
 #[allow(unsafe_code)]
 mod tier;
+mod wide;
 
 pub use dispatch::{DispatchCounters, Executor};
 pub use profile::{Cost, Profile, ProfiledInstruction};

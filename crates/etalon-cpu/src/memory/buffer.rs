@@ -61,12 +61,23 @@ impl Buffer {
         self.wide.is_some()
     }
 
-    /// What the word at a byte offset that is a multiple of 4 was last written
-    /// as, if that was a floating-point number and there is a wide plane.
-    #[must_use]
-    pub fn f64_at(&self, offset: u64) -> Option<f64> {
-        let word = usize::try_from(offset / 4).ok()?;
-        self.wide.as_ref()?.get(word)
+    /// For each word what it was last written as, if that was a floating-point
+    /// number and there is a wide plane.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn to_f64(&self) -> Result<Vec<Option<f64>>, RunError> {
+        let count = self.words.len();
+        let mut values = Vec::new();
+        values
+            .try_reserve_exact(count)
+            .map_err(|_| RunError::OutOfMemory {
+                what: "a buffer's contents".to_owned(),
+                bytes: (count as u64).saturating_mul(16),
+            })?;
+        let wide = self.wide.as_ref();
+        values.extend((0..count).map(|word| wide.and_then(|wide| wide.get(word))));
+        Ok(values)
     }
 
     pub(crate) fn wide(&self) -> Option<&WideWords> {

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
+use etalon_core::Format;
 use etalon_core::graph::Subresources;
 use etalon_core::image::ImageData;
 use etalon_core::resource::{Dimension, Extent, TextureDesc};
@@ -134,12 +135,19 @@ impl Texture {
     /// channel.
     pub fn widen(mut self) -> Result<Self, RunError> {
         if can_be_wide(self.desc.format) && self.wide.is_none() {
-            let texels = self.desc.bytes().unwrap_or(u64::MAX)
-                / u64::from(self.desc.format.texel_bytes());
+            let texels =
+                self.desc.bytes().unwrap_or(u64::MAX) / u64::from(self.desc.format.texel_bytes());
             self.wide = Some(WideTexels::zeroed(texels, self.desc.format.channels())?);
             self.refresh_wide();
         }
         Ok(self)
+    }
+
+    /// Whether textures of a format can have a wide plane: those that are read
+    /// as `f32`.
+    #[must_use]
+    pub fn can_be_wide(format: Format) -> bool {
+        can_be_wide(format)
     }
 
     /// Whether there is a wide plane.
@@ -309,12 +317,15 @@ impl TextureView<'_> {
         let mut bytes = [0; 16];
         match self.texels {
             Texels::B1(words) => bytes[0] = words.get(index)?.load(Ordering::Relaxed),
-            Texels::B2(words) => bytes[..2]
-                .copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes()),
-            Texels::B4(words) => bytes[..4]
-                .copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes()),
-            Texels::B8(words) => bytes[..8]
-                .copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes()),
+            Texels::B2(words) => {
+                bytes[..2].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
+            Texels::B4(words) => {
+                bytes[..4].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
+            Texels::B8(words) => {
+                bytes[..8].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
             Texels::B16(words) => {
                 let at = index.checked_mul(2)?;
                 let words = words.get(at..at.checked_add(2)?)?;
@@ -352,7 +363,11 @@ impl TextureView<'_> {
                 what: "a copy of a texture".to_owned(),
                 bytes: (count as u64).saturating_mul(32),
             })?;
-        texels.extend(self.indices().flatten().filter_map(|index| self.wide_texel(index)));
+        texels.extend(
+            self.indices()
+                .flatten()
+                .filter_map(|index| self.wide_texel(index)),
+        );
         Ok(Some(texels))
     }
 

@@ -65,8 +65,16 @@ pub(crate) struct WideTexels {
 }
 
 impl WideTexels {
+    /// A plane of zeros, of fewer than 2^32 - 4 words.
     pub(crate) fn zeroed(texels: u64, channels: u32) -> Result<Self, RunError> {
         let count = texels.saturating_mul(channels.into());
+        // So that the index of a word, and of one outside, is 32 bits.
+        if count >= u64::from(u32::MAX - 3) {
+            return Err(RunError::OutOfMemory {
+                what: "the wide plane of a texture".to_owned(),
+                bytes: count.saturating_mul(8),
+            });
+        }
         Ok(Self {
             values: reserve("the wide plane of a texture", count, 0)?,
             channels,
@@ -77,22 +85,18 @@ impl WideTexels {
         self.values.len() as u64 * 8
     }
 
-    /// The texels' channels, if there are `C` of them.
-    pub(crate) fn texels<const C: usize>(&self) -> &[[AtomicU64; C]] {
-        if self.channels as usize == C {
-            self.values.as_chunks().0
-        } else {
-            &[]
-        }
+    /// The channels of all texels.
+    pub(crate) fn words(&self) -> &[AtomicU64] {
+        &self.values
     }
 
-    pub(crate) fn channels(&self) -> usize {
-        self.channels as usize
+    pub(crate) fn channels(&self) -> u32 {
+        self.channels
     }
 
     /// One texel; channels that the format has not are 0, 0, 1.
     pub(crate) fn get(&self, texel: usize) -> Option<[f64; 4]> {
-        let channels = self.channels();
+        let channels = self.channels as usize;
         let at = texel.checked_mul(channels)?;
         let values = self.values.get(at..at.checked_add(channels)?)?;
         let mut out = [0.0, 0.0, 0.0, 1.0];
@@ -104,7 +108,7 @@ impl WideTexels {
 
     /// Sets one texel; nothing happens outside.
     pub(crate) fn set(&self, texel: usize, value: [f64; 4]) {
-        let channels = self.channels();
+        let channels = self.channels as usize;
         let values = texel
             .checked_mul(channels)
             .and_then(|at| self.values.get(at..at.checked_add(channels)?));
@@ -215,13 +219,15 @@ mod tests {
 
     #[test]
     fn planes_too_large_for_memory_are_refused() {
-        for texels in [u64::MAX, 1 << 60] {
+        for texels in [u64::MAX, 1 << 60, 1 << 30] {
             assert!(matches!(
                 WideTexels::zeroed(texels, 4),
                 Err(RunError::OutOfMemory { .. })
             ));
+        }
+        for words in [u64::MAX, 1 << 60] {
             assert!(matches!(
-                WideWords::new(texels),
+                WideWords::new(words),
                 Err(RunError::OutOfMemory { .. })
             ));
         }

@@ -15,6 +15,8 @@ mod single;
 pub(crate) use half::{f16_to_f32, f32_to_f16};
 pub(crate) use shadow::Shadow;
 
+use crate::registers::Lane;
+
 /// The number type that a kernel's `f32` is computed in.
 ///
 /// Literals and folded constants, uniforms, and the texels and words of
@@ -78,10 +80,12 @@ impl fmt::Display for NumberType {
 ///
 /// Integers, booleans and masks are the same in every number type; comparisons
 /// and conversions are where the two meet.
-pub(crate) trait Number: Copy + Default + Send + Sync + 'static {
+pub(crate) trait Number: Lane {
     /// Whether there is more in a number than its `f32`: then memory has a wide
     /// plane beside the texels and words.
     const WIDE: bool;
+    /// Whether the `f32` is kept by itself, not only as the nearest one.
+    const HAS_SINGLE: bool;
 
     fn from_f32(value: f32) -> Self;
     /// The nearest one.

@@ -30,6 +30,7 @@ macro_rules! both {
 }
 
 impl Number for Shadow {
+    const HAS_SINGLE: bool = true;
     const WIDE: bool = true;
 
     #[inline(always)]

@@ -4,6 +4,7 @@ use super::elementary::{atan2, cos, exp, exp2, log, log2, pow, sin, tan};
 use super::{Number, mask};
 
 impl Number for f32 {
+    const HAS_SINGLE: bool = true;
     const WIDE: bool = false;
 
     #[inline(always)]

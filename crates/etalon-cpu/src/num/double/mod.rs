@@ -64,6 +64,7 @@ fn truncated_magnitude(x: f64) -> u32 {
 }
 
 impl Number for f64 {
+    const HAS_SINGLE: bool = false;
     const WIDE: bool = true;
 
     #[inline(always)]

@@ -1,0 +1,95 @@
+//! Texels in number types wider than `f32`: between wide planes and lanes.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use etalon_core::Format;
+use etalon_core::format::Encoding;
+
+use super::state::State;
+use super::texels::OUTSIDE;
+use crate::code::{CodeInst, Slot};
+use crate::memory::{WideTexels, in_range};
+use crate::num::Number;
+use crate::registers::LANES;
+
+/// Indices of a channel's words; outside stays outside.
+#[inline(always)]
+fn words_of<const K: usize>(index: &[u32; K], channels: u32, channel: u32) -> [u32; K] {
+    let mut at = [0; K];
+    for k in 0..K {
+        // Planes have fewer words than 2^32 - 4, see `WideTexels`: `OUTSIDE`
+        // wraps to one of the last indices, which is none.
+        at[k] = index[k].wrapping_mul(channels).wrapping_add(channel);
+    }
+    at
+}
+
+/// A channel of the texels at `index`; 0 outside.
+#[inline(always)]
+pub(super) fn channel<const K: usize>(
+    wide: &WideTexels,
+    index: &[u32; K],
+    channel: u32,
+) -> [f64; K] {
+    let mut out = [0.0; K];
+    if channel < wide.channels() {
+        let words: &[AtomicU64] = wide.words();
+        let at = words_of(index, wide.channels(), channel);
+        for k in 0..K {
+            let word = words.get(at[k] as usize);
+            out[k] = f64::from_bits(word.map_or(0, |word| word.load(Ordering::Relaxed)));
+        }
+    } else if channel == 3 {
+        for k in 0..K {
+            out[k] = if index[k] == OUTSIDE { 0.0 } else { 1.0 };
+        }
+    }
+    out
+}
+
+/// Sets the results of a load from the wide plane and, as far as the number
+/// type keeps them, the texels' `singles`.
+#[inline(always)]
+pub(super) fn load<N: Number, const K: usize>(
+    state: &mut State<'_, N>,
+    inst: &CodeInst,
+    wide: &WideTexels,
+    index: &[u32; K],
+    singles: &[[u32; K]; 4],
+    chunk: usize,
+) {
+    for (c, result) in inst.results.iter().enumerate().take(4) {
+        if let Some(to) = *result {
+            let doubles = channel(wide, index, c as u32);
+            state.set_both(to, chunk, &singles[c], &doubles);
+        }
+    }
+}
+
+/// Stores channels in the wide plane, where the index is inside.
+#[inline(always)]
+pub(super) fn store<N: Number>(
+    state: &State<'_, N>,
+    wide: &WideTexels,
+    format: Format,
+    index: &[u32; LANES],
+    values: &[Slot],
+    chunk: usize,
+) {
+    let words: &[AtomicU64] = wide.words();
+    let encoding = format.encoding();
+    for (c, &slot) in (0..wide.channels()).zip(values) {
+        let mut value: [f64; LANES] = state.doubles(slot, chunk);
+        if encoding != Encoding::Float {
+            for k in 0..LANES {
+                value[k] = in_range(encoding, value[k]);
+            }
+        }
+        let at = words_of(index, wide.channels(), c);
+        for k in 0..LANES {
+            if let Some(word) = words.get(at[k] as usize) {
+                word.store(value[k].to_bits(), Ordering::Relaxed);
+            }
+        }
+    }
+}

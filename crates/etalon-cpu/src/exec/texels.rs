@@ -15,7 +15,7 @@ use crate::num::{f16_to_f32, f32_to_f16};
 pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// A texel's bytes in memory, or half of them.
-trait Word: Sync {
+pub(super) trait Word: Sync {
     type Bits: Copy + Default;
     fn get(&self) -> Self::Bits;
     fn put(&self, bits: Self::Bits);
@@ -53,7 +53,7 @@ fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> b
 
 /// The words at `index`, zero outside.
 #[inline(always)]
-fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] {
+pub(super) fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] {
     let mut bits = [W::Bits::default(); K];
     if all_inside(words, index, 1) {
         for k in 0..K {
@@ -120,7 +120,7 @@ fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K
 
 /// Writes the words at `index`, those inside.
 #[inline(always)]
-fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
+pub(super) fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
     if all_inside(words, index, 1) {
         for k in 0..K {
             // SAFETY: all indices were seen to be inside.

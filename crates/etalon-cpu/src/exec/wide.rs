@@ -1,12 +1,10 @@
 //! Texels in number types wider than `f32`: between wide planes and lanes.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use etalon_core::Format;
 use etalon_core::format::Encoding;
 
 use super::state::State;
-use super::texels::OUTSIDE;
+use super::texels::{self, OUTSIDE};
 use crate::code::{CodeInst, Slot};
 use crate::memory::{WideTexels, in_range};
 use crate::num::Number;
@@ -33,11 +31,10 @@ pub(super) fn channel<const K: usize>(
 ) -> [f64; K] {
     let mut out = [0.0; K];
     if channel < wide.channels() {
-        let words: &[AtomicU64] = wide.words();
         let at = words_of(index, wide.channels(), channel);
+        let bits = texels::load(wide.words(), &at);
         for k in 0..K {
-            let word = words.get(at[k] as usize);
-            out[k] = f64::from_bits(word.map_or(0, |word| word.load(Ordering::Relaxed)));
+            out[k] = f64::from_bits(bits[k]);
         }
     } else if channel == 3 {
         for k in 0..K {
@@ -76,7 +73,6 @@ pub(super) fn store<N: Number>(
     values: &[Slot],
     chunk: usize,
 ) {
-    let words: &[AtomicU64] = wide.words();
     let encoding = format.encoding();
     for (c, &slot) in (0..wide.channels()).zip(values) {
         let mut value: [f64; LANES] = state.doubles(slot, chunk);
@@ -86,10 +82,6 @@ pub(super) fn store<N: Number>(
             }
         }
         let at = words_of(index, wide.channels(), c);
-        for k in 0..LANES {
-            if let Some(word) = words.get(at[k] as usize) {
-                word.store(value[k].to_bits(), Ordering::Relaxed);
-            }
-        }
+        texels::store(wide.words(), &at, &value.map(f64::to_bits));
     }
 }

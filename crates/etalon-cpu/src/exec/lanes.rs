@@ -12,8 +12,9 @@
 //! numbers registers below the sizes it states, and every worker's files have
 //! those sizes for each chunk of its batches.
 
+use super::link::Operand;
 use super::state::State;
-use crate::num::Number;
+use crate::num::{Number, Shadow};
 pub(super) use crate::registers::BLOCK;
 use crate::registers::{ClassOf, LANES, Lane};
 
@@ -21,9 +22,9 @@ type LanesOf<L> = <L as Lane>::Lanes;
 type BlockOf<L> = <L as Lane>::Block;
 
 /// An operand of class `C` that loops over lanes read.
-pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
-    /// The register `number`, which the program has.
-    fn open(state: &mut State<'_, N>, number: u16) -> Self;
+pub(crate) trait Source<N: Number, C: ClassOf<N>>: Copy {
+    /// A register that the program has.
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self;
 
     /// A block of lanes; `entry` is where the chunk's registers begin.
     ///
@@ -35,14 +36,14 @@ pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
 
 /// A register of lanes.
 #[derive(Clone, Copy)]
-pub(super) struct Varying<L: Lane>(*const LanesOf<L>);
+pub(crate) struct Varying<L: Lane>(*const LanesOf<L>);
 
 impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
     #[inline(always)]
-    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
         let file = C::file(&mut state.registers);
-        debug_assert!(usize::from(number) < file.len());
-        Self(file.as_ptr().wrapping_add(usize::from(number)))
+        debug_assert!(operand.varying && usize::from(operand.number) < file.len());
+        Self(file.as_ptr().wrapping_add(usize::from(operand.number)))
     }
 
     #[inline(always)]
@@ -57,22 +58,86 @@ impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
 
 /// A register of one number.
 #[derive(Clone, Copy)]
-pub(super) struct Uniform<L>(L);
+pub(crate) struct Uniform<L>(L);
 
 impl<N: Number, C: ClassOf<N>> Source<N, C> for Uniform<C::Lane> {
     #[inline(always)]
-    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
         let file = C::uniforms(&mut state.registers);
-        debug_assert!(usize::from(number) < file.len());
+        debug_assert!(!operand.varying && usize::from(operand.number) < file.len());
         // SAFETY: `Code` states how many uniform registers it numbers, and the
         // file has that many.
-        Self(unsafe { *file.get_unchecked(usize::from(number)) })
+        Self(unsafe { *file.get_unchecked(usize::from(operand.number)) })
     }
 
     #[inline(always)]
     unsafe fn block(self, _: usize, _: usize) -> BlockOf<C::Lane> {
         self.0.splat()
     }
+}
+
+/// Either, as the instruction says when it runs.
+#[derive(Clone, Copy)]
+pub(crate) struct Either<L: Lane> {
+    /// Null where it is one number.
+    lanes: *const LanesOf<L>,
+    one: L,
+}
+
+impl<N: Number, C: ClassOf<N>> Source<N, C> for Either<C::Lane> {
+    #[inline(always)]
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
+        if operand.varying {
+            Self {
+                lanes: <Varying<C::Lane> as Source<N, C>>::open(state, operand).0,
+                one: C::Lane::default(),
+            }
+        } else {
+            Self {
+                lanes: std::ptr::null(),
+                one: <Uniform<C::Lane> as Source<N, C>>::open(state, operand).0,
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane> {
+        if self.lanes.is_null() {
+            self.one.splat()
+        } else {
+            // SAFETY: as the caller promises.
+            unsafe { <Varying<C::Lane> as Source<N, C>>::block(Varying(self.lanes), entry, lane) }
+        }
+    }
+}
+
+/// How a number type's handlers of arithmetic read their operands.
+///
+/// `f32` has a handler for every combination of registers of lanes and of one
+/// number. The other types have one for all: they are compiled in a third of
+/// the time, and a test per block is little beside their work.
+pub(crate) trait Operands: Lane {
+    type Varying<C: ClassOf<Self>>: Source<Self, C> + 'static
+    where
+        Self: Number;
+    type Uniform<C: ClassOf<Self>>: Source<Self, C> + 'static
+    where
+        Self: Number;
+}
+
+impl Operands for f32 {
+    type Varying<C: ClassOf<Self>> = Varying<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Uniform<C::Lane>;
+}
+
+impl Operands for f64 {
+    type Varying<C: ClassOf<Self>> = Either<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Either<C::Lane>;
+}
+
+impl Operands for Shadow {
+    type Varying<C: ClassOf<Self>> = Either<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Either<C::Lane>;
 }
 
 /// Runs `$body` for each block of the lanes of register `$number`, which it
@@ -220,9 +285,15 @@ pub(super) fn map4<N, CA, CB, CC, CE, CD, A, B, C, E>(
     blocks!(state, CD, d, |entry, lane, _old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
         let (c, e) = (c.block(entry, lane), e.block(entry, lane));
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k], c[k], e[k]);
+            let value = f(
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+                CC::Lane::of_block(&c, k),
+                CE::Lane::of_block(&e, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });

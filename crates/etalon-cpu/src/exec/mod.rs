@@ -31,6 +31,7 @@ pub use profile::{Cost, Profile, ProfiledInstruction};
 pub use tier::Tier;
 
 pub(crate) use dispatch::{DispatchFailure, Job};
+pub(crate) use lanes::Operands;
 pub(crate) use link::Linked;
 pub(crate) use profile::Recording;
 pub(crate) use state::{Failure, LocalIds, Resource};

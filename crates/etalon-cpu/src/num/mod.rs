@@ -15,6 +15,7 @@ mod single;
 pub(crate) use half::{f16_to_f32, f32_to_f16};
 pub(crate) use shadow::Shadow;
 
+use crate::exec::Operands;
 use crate::registers::Lane;
 
 /// The number type that a kernel's `f32` is computed in.
@@ -80,7 +81,7 @@ impl fmt::Display for NumberType {
 ///
 /// Integers, booleans and masks are the same in every number type; comparisons
 /// and conversions are where the two meet.
-pub(crate) trait Number: Lane {
+pub(crate) trait Number: Lane + Operands {
     /// Whether there is more in a number than its `f32`: then memory has a wide
     /// plane beside the texels and words.
     const WIDE: bool;

@@ -199,13 +199,13 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
             let wide = if N::WIDE { texture.wide } else { None };
             if let (Some(wide), false) = (wide, N::HAS_SINGLE) {
-                wide::load(state, inst, wide, &index, &[[0; K]; 4], chunk);
+                wide::load::<I, N, K>(state, inst, wide, &index, &[[0; K]; 4], chunk);
                 continue;
             }
             let mut channels = [[0; K]; 4];
             fetch::<I, K>(texture, &index, wanted, &mut channels);
             if let Some(wide) = wide {
-                wide::load(state, inst, wide, &index, &channels, chunk);
+                wide::load::<I, N, K>(state, inst, wide, &index, &channels, chunk);
                 continue;
             }
             for (result, channel) in inst.results.iter().zip(&channels) {

@@ -53,7 +53,7 @@ fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> b
 
 /// The words at `index`, zero outside.
 #[inline(always)]
-pub(super) fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] {
+fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] {
     let mut bits = [W::Bits::default(); K];
     if all_inside(words, index, 1) {
         for k in 0..K {
@@ -73,7 +73,10 @@ macro_rules! gathered {
     ($name:ident, $atomic:ty, $bits:ty, $gather:ident) => {
         /// [`load`] by the instruction set's gathers.
         #[inline(always)]
-        fn $name<I: Isa, const K: usize>(words: &[$atomic], index: &[u32; K]) -> [$bits; K] {
+        pub(super) fn $name<I: Isa, const K: usize>(
+            words: &[$atomic],
+            index: &[u32; K],
+        ) -> [$bits; K] {
             // Gathers take signed indices.
             if K % BLOCK != 0 || words.len() > i32::MAX as usize || !all_inside(words, index, 1) {
                 return load(words, index);

@@ -3,6 +3,7 @@
 use etalon_core::Format;
 use etalon_core::format::Encoding;
 
+use super::isa::Isa;
 use super::state::State;
 use super::texels::{self, OUTSIDE};
 use crate::code::{CodeInst, Slot};
@@ -24,7 +25,7 @@ fn words_of<const K: usize>(index: &[u32; K], channels: u32, channel: u32) -> [u
 
 /// A channel of the texels at `index`; 0 outside.
 #[inline(always)]
-pub(super) fn channel<const K: usize>(
+pub(super) fn channel<I: Isa, const K: usize>(
     wide: &WideTexels,
     index: &[u32; K],
     channel: u32,
@@ -32,7 +33,7 @@ pub(super) fn channel<const K: usize>(
     let mut out = [0.0; K];
     if channel < wide.channels() {
         let at = words_of(index, wide.channels(), channel);
-        let bits = texels::load(wide.words(), &at);
+        let bits = texels::load8::<I, K>(wide.words(), &at);
         for k in 0..K {
             out[k] = f64::from_bits(bits[k]);
         }
@@ -47,7 +48,7 @@ pub(super) fn channel<const K: usize>(
 /// Sets the results of a load from the wide plane and, as far as the number
 /// type keeps them, the texels' `singles`.
 #[inline(always)]
-pub(super) fn load<N: Number, const K: usize>(
+pub(super) fn load<I: Isa, N: Number, const K: usize>(
     state: &mut State<'_, N>,
     inst: &CodeInst,
     wide: &WideTexels,
@@ -57,7 +58,7 @@ pub(super) fn load<N: Number, const K: usize>(
 ) {
     for (c, result) in inst.results.iter().enumerate().take(4) {
         if let Some(to) = *result {
-            let doubles = channel(wide, index, c as u32);
+            let doubles = channel::<I, K>(wide, index, c as u32);
             state.set_both(to, chunk, &singles[c], &doubles);
         }
     }
@@ -82,6 +83,10 @@ pub(super) fn store<N: Number>(
             }
         }
         let at = words_of(index, wide.channels(), c);
-        texels::store(wide.words(), &at, &value.map(f64::to_bits));
+        let mut bits = [0; LANES];
+        for k in 0..LANES {
+            bits[k] = value[k].to_bits();
+        }
+        texels::store(wide.words(), &at, &bits);
     }
 }

@@ -29,9 +29,10 @@ mod registers;
 pub mod semantics;
 mod translate;
 
-pub use backend::{CpuBackend, CpuOptions};
+pub use backend::{CpuBackend, CpuOptions, WideCapture, WideExecution};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
 pub use exec::{Cost, DispatchCounters, Executor, Profile, ProfiledInstruction, Tier};
 pub use memory::{Buffer, Texture, TextureView};
+pub use num::NumberType;
 pub use program::{BoundResource, Program};

@@ -13,6 +13,7 @@ use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
 use crate::exec::{DispatchCounters, Executor, Linked, Profile, Recording, Resource, Tier};
 use crate::memory::{Buffer, TextureView};
+use crate::num::{Number, NumberType, Shadow};
 use crate::translate::{self, Fail};
 use crate::{exec, lower};
 
@@ -26,10 +27,16 @@ pub struct Program {
     immediates: Option<u32>,
     code: Code,
     local_ids: exec::LocalIds,
-    linked: [OnceLock<Linked<f32>>; Tier::ALL.len()],
+    singles: ByTier<f32>,
+    doubles: ByTier<f64>,
+    shadows: ByTier<Shadow>,
     recording: Mutex<Recording>,
     locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
 }
+
+/// The code linked to the handlers of a number type, by instruction set; each
+/// when it is first needed.
+type ByTier<N> = [OnceLock<Linked<N>>; Tier::ALL.len()];
 
 /// What a binding is given.
 #[derive(Clone, Debug)]
@@ -175,7 +182,9 @@ impl Program {
             immediates: translation.immediates,
             code,
             local_ids: exec::LocalIds::new(workgroup_size),
-            linked: Default::default(),
+            singles: Default::default(),
+            doubles: Default::default(),
+            shadows: Default::default(),
             recording: Mutex::default(),
             locate,
         })
@@ -250,16 +259,28 @@ impl Program {
             bound.push(self.check(binding, resources.get(i))?);
         }
         // Where translation has put it.
-        bound.push(Resource::Buffer(immediates.words(), immediates.len()));
+        bound.push(Resource::Buffer(&immediates));
+        match executor.number_type() {
+            NumberType::F32 => self.run(executor, workgroups, &bound, &self.singles),
+            NumberType::F64 => self.run(executor, workgroups, &bound, &self.doubles),
+            NumberType::Shadow => self.run(executor, workgroups, &bound, &self.shadows),
+        }
+    }
+
+    fn run<N: Number>(
+        &self,
+        executor: &Executor,
+        workgroups: [u32; 3],
+        resources: &[Resource<'_>],
+        linked: &ByTier<N>,
+    ) -> Result<DispatchCounters, RunError> {
         let tier = executor.tier();
-        let linked = self.linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier));
-        let invocations = self.workgroup_size.iter().product();
         let job = exec::Job {
             code: &self.code,
-            linked,
-            resources: &bound,
+            linked: linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier)),
+            resources,
             local_ids: &self.local_ids,
-            invocations,
+            invocations: self.workgroup_size.iter().product(),
             recording: executor.profiles().then_some(&self.recording),
         };
         job.run(executor, workgroups)
@@ -335,7 +356,7 @@ impl Program {
                         format!("one of {} bytes", buffer.len()),
                     ));
                 }
-                Ok(Resource::Buffer(buffer.words(), buffer.len()))
+                Ok(Resource::Buffer(buffer))
             }
             (BindingKind::Texture { view, kind }, Some(BoundResource::Texture(texture))) => {
                 let desc = texture.desc();

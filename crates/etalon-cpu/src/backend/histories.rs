@@ -46,9 +46,9 @@ impl Histories {
             if let Some(other) = self.0.remove(&planned.name) {
                 release(other, pool);
             }
-            let previous = pool.texture(planned.desc)?;
+            let previous = pool.texture(planned.desc, true)?;
             previous.view().fill(clear_texel(planned.initial));
-            let current = pool.texture(planned.desc)?;
+            let current = pool.texture(planned.desc, true)?;
             self.0
                 .insert(planned.name.clone(), History { previous, current });
         }

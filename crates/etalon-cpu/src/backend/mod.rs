@@ -4,6 +4,7 @@ mod histories;
 mod pool;
 mod resources;
 mod run;
+mod wide;
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,8 +16,10 @@ use etalon_core::resource::Limits;
 
 use self::histories::Histories;
 use self::pool::Pool;
+pub use self::wide::{WideCapture, WideExecution};
 use crate::error::RunError;
 use crate::exec::{Executor, Profile, Tier};
+use crate::num::NumberType;
 use crate::program::Program;
 
 /// How plans are run on the CPU.
@@ -33,6 +36,9 @@ pub struct CpuOptions {
     pub max_trips: u32,
     /// See [`Executor::with_profile`].
     pub profile: bool,
+    /// What kernels compute in. In other types than `f32`, what passes write has
+    /// a wide plane: see [`CpuBackend::execute_wide`].
+    pub number_type: NumberType,
 }
 
 impl Default for CpuOptions {
@@ -43,6 +49,7 @@ impl Default for CpuOptions {
             lanes: Executor::DEFAULT_LANES,
             max_trips: Executor::DEFAULT_MAX_TRIPS,
             profile: false,
+            number_type: NumberType::F32,
         }
     }
 }
@@ -71,11 +78,12 @@ impl CpuBackend {
             .with_lanes(options.lanes)
             .with_max_trips(options.max_trips)
             .with_profile(options.profile)
+            .with_number_type(options.number_type)
             .with_tier(options.tier.unwrap_or_else(Tier::best));
         Ok(Self {
             executor,
             programs: HashMap::new(),
-            pool: Pool::default(),
+            pool: Pool::new(options.number_type.is_wide()),
             histories: Histories::default(),
             counters: Counters::default(),
         })
@@ -112,6 +120,26 @@ impl CpuBackend {
                 call: "translate",
                 reason: format!("kernel {} was not kept", kernel.name),
             })
+    }
+
+    /// [`Backend::execute`], and beside each capture its values in `f64`: what
+    /// the passes computed in the backend's [number
+    /// type](CpuOptions::number_type), before it was rounded to the storage
+    /// format.
+    ///
+    /// # Errors
+    /// Those of [`Backend::execute`].
+    pub fn execute_wide(
+        &mut self,
+        plan: &Plan,
+        inputs: &Inputs<'_>,
+    ) -> Result<WideExecution, BackendError> {
+        let mut captures = Vec::new();
+        let execution = self.run(plan, inputs, Some(&mut captures))?;
+        Ok(WideExecution {
+            execution,
+            captures,
+        })
     }
 
     /// Translates a kernel unless that was done before.
@@ -176,7 +204,7 @@ impl Backend for CpuBackend {
     }
 
     fn execute(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Execution, BackendError> {
-        self.run(plan, inputs)
+        self.run(plan, inputs, None)
     }
 
     fn reset_histories(&mut self) {

@@ -19,10 +19,12 @@ pub(super) struct PoolCounters {
 }
 
 /// Free resources by shape, each with the frame that used it last.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Pool {
-    textures: BTreeMap<Shape, Vec<(u64, Texture)>>,
-    buffers: BTreeMap<u64, Vec<(u64, Buffer)>>,
+    textures: BTreeMap<(Shape, bool), Vec<(u64, Texture)>>,
+    buffers: BTreeMap<(u64, bool), Vec<(u64, Buffer)>>,
+    /// Whether what is written needs a wide plane.
+    wide: bool,
     frame: u64,
     counters: PoolCounters,
 }
@@ -45,42 +47,66 @@ fn shape(desc: &TextureDesc) -> Shape {
 }
 
 impl Pool {
+    pub(super) fn new(wide: bool) -> Self {
+        Self {
+            textures: BTreeMap::new(),
+            buffers: BTreeMap::new(),
+            wide,
+            frame: 0,
+            counters: PoolCounters::default(),
+        }
+    }
+
     pub(super) fn counters(&self) -> PoolCounters {
         self.counters
     }
 
-    /// A texture with whatever it held last.
-    pub(super) fn texture(&mut self, desc: TextureDesc) -> Result<Texture, RunError> {
-        if let Some((_, texture)) = self.textures.get_mut(&shape(&desc)).and_then(Vec::pop) {
+    /// A texture with whatever it held last; `written` if passes write it.
+    pub(super) fn texture(
+        &mut self,
+        desc: TextureDesc,
+        written: bool,
+    ) -> Result<Texture, RunError> {
+        let wide = written && self.wide && Texture::can_be_wide(desc.format);
+        let key = (shape(&desc), wide);
+        if let Some((_, texture)) = self.textures.get_mut(&key).and_then(Vec::pop) {
             return Ok(texture);
         }
-        let texture = Texture::zeroed(desc)?;
+        let mut texture = Texture::zeroed(desc)?;
+        if wide {
+            texture = texture.widen()?;
+        }
         self.counters.textures += 1;
         self.counters.bytes += texture.bytes();
         Ok(texture)
     }
 
-    /// A buffer with whatever it held last.
-    pub(super) fn buffer(&mut self, bytes: u64) -> Result<Buffer, RunError> {
-        if let Some((_, buffer)) = self.buffers.get_mut(&bytes).and_then(Vec::pop) {
+    /// A buffer with whatever it held last; `written` if passes write it.
+    pub(super) fn buffer(&mut self, bytes: u64, written: bool) -> Result<Buffer, RunError> {
+        let wide = written && self.wide;
+        let key = (bytes, wide);
+        if let Some((_, buffer)) = self.buffers.get_mut(&key).and_then(Vec::pop) {
             return Ok(buffer);
         }
-        let buffer = Buffer::zeroed(bytes)?;
+        let mut buffer = Buffer::zeroed(bytes)?;
+        if wide {
+            buffer = buffer.widen()?;
+        }
         self.counters.buffers += 1;
-        self.counters.bytes += buffer.len();
+        self.counters.bytes += buffer.held_bytes();
         Ok(buffer)
     }
 
     pub(super) fn return_texture(&mut self, texture: Texture) {
         self.textures
-            .entry(shape(&texture.desc()))
+            .entry((shape(&texture.desc()), texture.is_wide()))
             .or_default()
             .push((self.frame, texture));
     }
 
     pub(super) fn return_buffer(&mut self, buffer: Buffer) {
         self.buffers
-            .entry(buffer.len())
+            .entry((buffer.len(), buffer.is_wide()))
             .or_default()
             .push((self.frame, buffer));
     }
@@ -100,7 +126,7 @@ impl Pool {
         self.buffers.retain(|_, list| {
             list.retain(|(used, buffer)| {
                 let keep = *used >= oldest;
-                freed += if keep { 0 } else { buffer.len() };
+                freed += if keep { 0 } else { buffer.held_bytes() };
                 keep
             });
             !list.is_empty()

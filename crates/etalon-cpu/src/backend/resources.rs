@@ -90,7 +90,7 @@ impl Resources {
                         .map(|import| texture_input(import, desc, inputs))
                         .transpose()?;
                     let mut texture = pool
-                        .texture(*desc)
+                        .texture(*desc, import.is_none())
                         .map_err(|error| out_of_memory(name, error))?;
                     if let Some(contents) = contents {
                         texture.write(contents);
@@ -103,7 +103,7 @@ impl Resources {
                         .map(|import| buffer_input(import, desc.bytes, inputs))
                         .transpose()?;
                     let mut buffer = pool
-                        .buffer(desc.bytes)
+                        .buffer(desc.bytes, import.is_none())
                         .map_err(|error| out_of_memory(name, error))?;
                     if let Some(contents) = contents {
                         buffer.write(contents);

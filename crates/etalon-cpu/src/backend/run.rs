@@ -9,7 +9,7 @@ use etalon_core::plan::{Bound, Groups, Plan, Step};
 
 use super::histories::clear_texel;
 use super::resources::Resources;
-use super::{CpuBackend, malformed, step_error};
+use super::{CpuBackend, WideCapture, malformed, step_error};
 use crate::error::RunError;
 use crate::memory::Buffer;
 use crate::program::BoundResource;
@@ -19,6 +19,7 @@ impl CpuBackend {
         &mut self,
         plan: &Plan,
         inputs: &Inputs<'_>,
+        wide: Option<&mut Vec<WideCapture>>,
     ) -> Result<Execution, BackendError> {
         for step in &plan.steps {
             if let Step::Dispatch { kernel, .. } = &step.step {
@@ -26,7 +27,7 @@ impl CpuBackend {
             }
         }
         let mut resources = Resources::default();
-        let result = self.run_with(plan, inputs, &mut resources);
+        let result = self.run_with(plan, inputs, &mut resources, wide);
         resources.release(&mut self.pool);
         self.pool.end_frame();
         if result.is_ok() {
@@ -40,6 +41,7 @@ impl CpuBackend {
         plan: &Plan,
         inputs: &Inputs<'_>,
         resources: &mut Resources,
+        mut wide: Option<&mut Vec<WideCapture>>,
     ) -> Result<Execution, BackendError> {
         resources.acquire(plan, inputs, &mut self.pool)?;
         self.histories
@@ -51,7 +53,12 @@ impl CpuBackend {
             self.counters.barriers += step.barriers.len() as u64;
             let captured = self.step(plan, &step.name, &step.step, resources)?;
             match captured {
-                Some(captured) => execution.captures.push(captured),
+                Some(captured) => {
+                    execution.captures.push(captured);
+                    if let Some(wide) = &mut wide {
+                        wide.push(self.capture_wide(plan, &step.name, &step.step, resources)?);
+                    }
+                }
                 None => {
                     let nanoseconds = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
                     execution.times.push(StepTime {
@@ -132,6 +139,35 @@ impl CpuBackend {
             }
         }
         Ok(None)
+    }
+
+    /// What a capture step captures, in `f64`.
+    fn capture_wide(
+        &self,
+        plan: &Plan,
+        name: &str,
+        step: &Step,
+        resources: &Resources,
+    ) -> Result<WideCapture, BackendError> {
+        let Step::Capture {
+            resource, range, ..
+        } = step
+        else {
+            return Ok(WideCapture::None);
+        };
+        let is_buffer = plan
+            .resources
+            .get(*resource as usize)
+            .is_some_and(|planned| matches!(planned.desc, ResourceDesc::Buffer(_)));
+        if is_buffer {
+            let values = resources.buffer(name, *resource)?.to_f64();
+            return Ok(WideCapture::Buffer(
+                values.map_err(|error| step_error(name, error))?,
+            ));
+        }
+        let view = resources.texture(name, plan, &self.histories, *resource, *range)?;
+        let texels = view.to_f64().map_err(|error| step_error(name, error))?;
+        Ok(texels.map_or(WideCapture::None, WideCapture::Texture))
     }
 
     fn dispatch(

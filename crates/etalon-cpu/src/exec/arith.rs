@@ -2,7 +2,7 @@
 
 use std::marker::PhantomData;
 
-use super::lanes::{Source, Uniform, Varying, map1, map2, map3, map4, update2};
+use super::lanes::{Operands, Source, map1, map2, map3, map4, update2};
 use super::link::Instr;
 use super::state::State;
 use super::tier::{Handler, Step, Tier};
@@ -16,8 +16,8 @@ pub(super) struct Select<'a> {
     pub(super) varying: &'a [bool],
 }
 
-type V<N, C> = Varying<<C as ClassOf<N>>::Lane>;
-type U<N, C> = Uniform<<C as ClassOf<N>>::Lane>;
+type V<N, C> = <N as Operands>::Varying<C>;
+type U<N, C> = <N as Operands>::Uniform<C>;
 
 impl<N: Number> Visitor<N> for Select<'_> {
     type Output = Handler<N>;
@@ -113,7 +113,7 @@ struct UnaryLanes<O>(PhantomData<O>);
 impl<N: Number, O: Unary<N>> Step<N> for UnaryLanes<O> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = <V<N, O::A> as Source<N, O::A>>::open(state, instr.a);
+        let a = <V<N, O::A> as Source<N, O::A>>::open(state, instr.operand(0));
         map1::<N, O::A, O::D, _>(state, instr.d, a, O::eval);
     }
 }
@@ -149,8 +149,8 @@ where
 {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = A::open(state, instr.a);
-        let b = B::open(state, instr.b);
+        let a = A::open(state, instr.operand(0));
+        let b = B::open(state, instr.operand(1));
         map2::<N, O::A, O::B, O::D, _, _>(state, instr.d, a, b, O::eval);
     }
 }
@@ -178,9 +178,9 @@ where
 {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = A::open(state, instr.a);
-        let b = B::open(state, instr.b);
-        let c = C::open(state, instr.c);
+        let a = A::open(state, instr.operand(0));
+        let b = B::open(state, instr.operand(1));
+        let c = C::open(state, instr.operand(2));
         map3::<N, O::A, O::B, O::C, O::D, _, _, _>(state, instr.d, a, b, c, O::eval);
     }
 }
@@ -210,10 +210,10 @@ where
 {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = A::open(state, instr.a);
-        let b = B::open(state, instr.b);
-        let c = C::open(state, instr.c);
-        let e = E::open(state, instr.e);
+        let a = A::open(state, instr.operand(0));
+        let b = B::open(state, instr.operand(1));
+        let c = C::open(state, instr.operand(2));
+        let e = E::open(state, instr.operand(3));
         map4::<N, O::A, O::B, O::C, O::E, O::D, _, _, _, _>(state, instr.d, a, b, c, e, O::eval);
     }
 }
@@ -294,7 +294,7 @@ struct CopyLanes<C, A>(PhantomData<(C, A)>);
 impl<N: Number, C: ClassOf<N>, A: Source<N, C>> Step<N> for CopyLanes<C, A> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = A::open(state, instr.a);
+        let a = A::open(state, instr.operand(0));
         map1::<N, C, C, _>(state, instr.d, a, |a| a);
     }
 }
@@ -304,8 +304,8 @@ struct CopyMasked<C, A>(PhantomData<(C, A)>);
 impl<N: Number, C: Selects<N>, A: Source<N, C>> Step<N> for CopyMasked<C, A> {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
-        let a = A::open(state, instr.a);
-        let mask = <V<N, Int> as Source<N, Int>>::open(state, instr.c);
+        let a = A::open(state, instr.operand(0));
+        let mask = <V<N, Int> as Source<N, Int>>::open(state, instr.operand(2));
         update2::<N, C, Int, C, _, _>(state, instr.d, a, mask, |d, a, mask| C::select(mask, a, d));
     }
 }

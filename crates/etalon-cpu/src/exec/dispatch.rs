@@ -12,7 +12,7 @@ use super::subgroup::MAX_SUBGROUP;
 use super::tier::Tier;
 use crate::code::Code;
 use crate::error::RunError;
-use crate::num::Number;
+use crate::num::{Number, NumberType};
 use crate::registers::{LANES, Lanes, Registers};
 
 /// Workers and what they run with.
@@ -20,6 +20,7 @@ use crate::registers::{LANES, Lanes, Registers};
 pub struct Executor {
     pool: rayon::ThreadPool,
     tier: Tier,
+    number_type: NumberType,
     batch: u32,
     max_trips: u32,
     profile: bool,
@@ -63,6 +64,7 @@ impl Executor {
         Ok(Self {
             pool,
             tier: Tier::best(),
+            number_type: NumberType::F32,
             batch: Self::DEFAULT_LANES,
             max_trips: Self::DEFAULT_MAX_TRIPS,
             profile: false,
@@ -74,6 +76,13 @@ impl Executor {
     #[must_use]
     pub fn with_tier(mut self, tier: Tier) -> Self {
         self.tier = tier.or_baseline();
+        self
+    }
+
+    /// Computes in the given number type.
+    #[must_use]
+    pub fn with_number_type(mut self, number_type: NumberType) -> Self {
+        self.number_type = number_type;
         self
     }
 
@@ -127,6 +136,12 @@ impl Executor {
     #[must_use]
     pub fn tier(&self) -> Tier {
         self.tier
+    }
+
+    /// The number type in use.
+    #[must_use]
+    pub fn number_type(&self) -> NumberType {
+        self.number_type
     }
 
     /// Number of threads.
@@ -320,7 +335,7 @@ impl<N: Number> Job<'_, N> {
                 stride,
             },
             chunks,
-            private_floats: allocate::<Lanes<N>>(
+            private_floats: allocate::<N::Lanes>(
                 (resources.private.float as usize).saturating_mul(chunks),
             )?,
             private_ints: allocate::<Lanes<u32>>(

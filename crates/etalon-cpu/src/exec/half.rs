@@ -20,7 +20,7 @@ impl<N: Number> Step<N> for BufferStoreHalf {
         else {
             return;
         };
-        let (words, _) = words(state, buffer);
+        let words = words(state, buffer);
         for chunk in 0..state.chunks {
             let mask = state.mask(inst, chunk);
             let value: [u32; LANES] = state.ints(*value, chunk);

@@ -6,6 +6,7 @@ use super::memory::rounds;
 use super::state::{Resource, State};
 use super::texels::{OUTSIDE, fetch, put};
 use super::tier::{Handler, Step, Tier, TieredStep};
+use super::wide;
 use crate::code::{CodeInst, Slot};
 use crate::ir::{ImageAccess, ImageQuery, Op};
 use crate::memory::{Level, TextureView};
@@ -28,7 +29,10 @@ pub(super) fn query<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     }
 }
 
-pub(super) fn texture<'a, N>(state: &State<'a, N>, image: u16) -> Option<&'a TextureView<'a>> {
+pub(super) fn texture<'a, N: Number>(
+    state: &State<'a, N>,
+    image: u16,
+) -> Option<&'a TextureView<'a>> {
     match state.resources.get(usize::from(image)) {
         Some(&Resource::Texture(texture)) => Some(texture),
         _ => None,
@@ -145,8 +149,17 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
         let wanted = wanted(inst);
         for chunk in 0..rounds::<N, K>(state) {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
+            let wide = if N::WIDE { texture.wide } else { None };
+            if let (Some(wide), false) = (wide, N::HAS_SINGLE) {
+                wide::load::<I, N, K>(state, inst, wide, &index, &[[0; K]; 4], chunk);
+                continue;
+            }
             let mut channels = [[0; K]; 4];
             fetch::<I, K>(texture, &index, wanted, &mut channels);
+            if let Some(wide) = wide {
+                wide::load::<I, N, K>(state, inst, wide, &index, &channels, chunk);
+                continue;
+            }
             for (result, channel) in inst.results.iter().zip(&channels) {
                 if let Some(to) = *result {
                     state.set_bits(to, chunk, channel);
@@ -179,6 +192,9 @@ impl<N: Number> TieredStep<N> for Store {
             }
             let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
             put::<I, LANES>(texture, &index, &channels);
+            if let (true, Some(wide)) = (N::WIDE, texture.wide) {
+                wide::store(state, wide, texture.desc().format, &index, value, chunk);
+            }
         }
     }
 }

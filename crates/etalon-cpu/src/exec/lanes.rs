@@ -12,67 +12,132 @@
 //! numbers registers below the sizes it states, and every worker's files have
 //! those sizes for each chunk of its batches.
 
+use super::link::Operand;
 use super::state::State;
-use crate::num::Number;
-use crate::registers::{ClassOf, LANES, Lanes};
+use crate::num::{Number, Shadow};
+pub(super) use crate::registers::BLOCK;
+use crate::registers::{ClassOf, LANES, Lane};
 
-/// Lanes that a loop handles together.
-pub(super) const BLOCK: usize = 16;
+type LanesOf<L> = <L as Lane>::Lanes;
+type BlockOf<L> = <L as Lane>::Block;
 
 /// An operand of class `C` that loops over lanes read.
-pub(super) trait Source<N: Number, C: ClassOf<N>>: Copy {
-    /// The register `number`, which the program has.
-    fn open(state: &mut State<'_, N>, number: u16) -> Self;
+pub(crate) trait Source<N: Number, C: ClassOf<N>>: Copy {
+    /// A register that the program has.
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self;
 
     /// A block of lanes; `entry` is where the chunk's registers begin.
     ///
     /// # Safety
     /// `entry` is a multiple of the files' stride below their end, and `lane` a
     /// multiple of [`BLOCK`] below [`LANES`].
-    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK];
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane>;
 }
 
 /// A register of lanes.
 #[derive(Clone, Copy)]
-pub(super) struct Varying<L>(*const Lanes<L>);
+pub(crate) struct Varying<L: Lane>(*const LanesOf<L>);
 
 impl<N: Number, C: ClassOf<N>> Source<N, C> for Varying<C::Lane> {
     #[inline(always)]
-    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
         let file = C::file(&mut state.registers);
-        debug_assert!(usize::from(number) < file.len());
-        Self(file.as_ptr().wrapping_add(usize::from(number)))
+        debug_assert!(operand.varying && usize::from(operand.number) < file.len());
+        Self(file.as_ptr().wrapping_add(usize::from(operand.number)))
     }
 
     #[inline(always)]
-    unsafe fn block(self, entry: usize, lane: usize) -> [C::Lane; BLOCK] {
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane> {
         // SAFETY: the register's number is below the stride (see the module's
-        // documentation), so the block is in the file, which is initialised.
-        unsafe {
-            let lanes = self.0.add(entry).cast::<C::Lane>().add(lane);
-            lanes.cast::<[C::Lane; BLOCK]>().read()
-        }
+        // documentation), so the register is in the file, which is initialised
+        // and which nothing writes while the reference lives.
+        let lanes = unsafe { &*self.0.add(entry) };
+        C::Lane::block(lanes, lane)
     }
 }
 
 /// A register of one number.
 #[derive(Clone, Copy)]
-pub(super) struct Uniform<L>(L);
+pub(crate) struct Uniform<L>(L);
 
 impl<N: Number, C: ClassOf<N>> Source<N, C> for Uniform<C::Lane> {
     #[inline(always)]
-    fn open(state: &mut State<'_, N>, number: u16) -> Self {
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
         let file = C::uniforms(&mut state.registers);
-        debug_assert!(usize::from(number) < file.len());
+        debug_assert!(!operand.varying && usize::from(operand.number) < file.len());
         // SAFETY: `Code` states how many uniform registers it numbers, and the
         // file has that many.
-        Self(unsafe { *file.get_unchecked(usize::from(number)) })
+        Self(unsafe { *file.get_unchecked(usize::from(operand.number)) })
     }
 
     #[inline(always)]
-    unsafe fn block(self, _: usize, _: usize) -> [C::Lane; BLOCK] {
-        [self.0; BLOCK]
+    unsafe fn block(self, _: usize, _: usize) -> BlockOf<C::Lane> {
+        self.0.splat()
     }
+}
+
+/// Either, as the instruction says when it runs.
+#[derive(Clone, Copy)]
+pub(crate) struct Either<L: Lane> {
+    /// Null where it is one number.
+    lanes: *const LanesOf<L>,
+    one: L,
+}
+
+impl<N: Number, C: ClassOf<N>> Source<N, C> for Either<C::Lane> {
+    #[inline(always)]
+    fn open(state: &mut State<'_, N>, operand: Operand) -> Self {
+        if operand.varying {
+            Self {
+                lanes: <Varying<C::Lane> as Source<N, C>>::open(state, operand).0,
+                one: C::Lane::default(),
+            }
+        } else {
+            Self {
+                lanes: std::ptr::null(),
+                one: <Uniform<C::Lane> as Source<N, C>>::open(state, operand).0,
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn block(self, entry: usize, lane: usize) -> BlockOf<C::Lane> {
+        if self.lanes.is_null() {
+            self.one.splat()
+        } else {
+            // SAFETY: as the caller promises.
+            unsafe { <Varying<C::Lane> as Source<N, C>>::block(Varying(self.lanes), entry, lane) }
+        }
+    }
+}
+
+/// How a number type's handlers of arithmetic read their operands.
+///
+/// `f32` has a handler for every combination of registers of lanes and of one
+/// number. The other types have one for all: they are compiled in a third of
+/// the time, and a test per block is little beside their work.
+pub(crate) trait Operands: Lane {
+    type Varying<C: ClassOf<Self>>: Source<Self, C> + 'static
+    where
+        Self: Number;
+    type Uniform<C: ClassOf<Self>>: Source<Self, C> + 'static
+    where
+        Self: Number;
+}
+
+impl Operands for f32 {
+    type Varying<C: ClassOf<Self>> = Varying<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Uniform<C::Lane>;
+}
+
+impl Operands for f64 {
+    type Varying<C: ClassOf<Self>> = Either<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Either<C::Lane>;
+}
+
+impl Operands for Shadow {
+    type Varying<C: ClassOf<Self>> = Either<C::Lane>;
+    type Uniform<C: ClassOf<Self>> = Either<C::Lane>;
 }
 
 /// Runs `$body` for each block of the lanes of register `$number`, which it
@@ -90,13 +155,9 @@ macro_rules! blocks {
                 // SAFETY: as in `Varying::block`. Nothing else refers to the
                 // files: what the body reads, it reads by value.
                 unsafe {
-                    let $old = first
-                        .add($entry)
-                        .cast::<<$class as ClassOf<N>>::Lane>()
-                        .add($lane)
-                        .cast::<[<$class as ClassOf<N>>::Lane; BLOCK]>();
+                    let $old = || <$class as ClassOf<N>>::Lane::block(&*first.add($entry), $lane);
                     let new = $body;
-                    $old.write(new);
+                    <$class as ClassOf<N>>::Lane::set_block(&mut *first.add($entry), $lane, new);
                 }
                 $lane += BLOCK;
             }
@@ -125,9 +186,9 @@ pub(super) fn map1<N, CA, CD, A>(
 {
     blocks!(state, CD, d, |entry, lane, _old| {
         let a = a.block(entry, lane);
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k]);
+            CD::Lane::set_in_block(&mut new, k, f(CA::Lane::of_block(&a, k)));
         }
         new
     });
@@ -151,9 +212,10 @@ pub(super) fn map2<N, CA, CB, CD, A, B>(
 {
     blocks!(state, CD, d, |entry, lane, _old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k]);
+            let value = f(CA::Lane::of_block(&a, k), CB::Lane::of_block(&b, k));
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });
@@ -184,9 +246,14 @@ pub(super) fn map3<N, CA, CB, CC, CD, A, B, C>(
             b.block(entry, lane),
             c.block(entry, lane),
         );
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k], c[k]);
+            let value = f(
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+                CC::Lane::of_block(&c, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });
@@ -218,9 +285,15 @@ pub(super) fn map4<N, CA, CB, CC, CE, CD, A, B, C, E>(
     blocks!(state, CD, d, |entry, lane, _old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
         let (c, e) = (c.block(entry, lane), e.block(entry, lane));
-        let mut new = [CD::Lane::default(); BLOCK];
+        let mut new = CD::Lane::default().splat();
         for k in 0..BLOCK {
-            new[k] = f(a[k], b[k], c[k], e[k]);
+            let value = f(
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+                CC::Lane::of_block(&c, k),
+                CE::Lane::of_block(&e, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });
@@ -244,9 +317,14 @@ pub(super) fn update2<N, CA, CB, CD, A, B>(
 {
     blocks!(state, CD, d, |entry, lane, old| {
         let (a, b) = (a.block(entry, lane), b.block(entry, lane));
-        let mut new = old.read();
+        let mut new = old();
         for k in 0..BLOCK {
-            new[k] = f(new[k], a[k], b[k]);
+            let value = f(
+                CD::Lane::of_block(&new, k),
+                CA::Lane::of_block(&a, k),
+                CB::Lane::of_block(&b, k),
+            );
+            CD::Lane::set_in_block(&mut new, k, value);
         }
         new
     });

@@ -20,8 +20,29 @@ pub(super) struct Instr {
     pub(super) c: u16,
     /// Fourth operand.
     pub(super) e: u16,
+    /// A bit for each of the four that is a register of lanes.
+    varying: u8,
     /// Index in [`Code::insts`].
     pub(super) index: u32,
+}
+
+/// An operand of a simple instruction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Operand {
+    pub(super) number: u16,
+    /// Whether it is a register of lanes.
+    pub(super) varying: bool,
+}
+
+impl Instr {
+    /// The operand at a place from 0 to 3; the mask of a copy is at 2.
+    #[inline(always)]
+    pub(super) fn operand(&self, place: usize) -> Operand {
+        Operand {
+            number: [self.a, self.b, self.c, self.e][place],
+            varying: self.varying >> place & 1 != 0,
+        }
+    }
 }
 
 /// A program linked to the handlers of an instruction set.
@@ -39,7 +60,12 @@ impl<N: Number> Linked<N> {
             .iter()
             .enumerate()
             .map(|(index, inst)| {
-                let operand = |i: usize| inst.operands.get(i).map_or(0, |slot| slot.number);
+                let slot = |i: usize| match inst.mask {
+                    Some(mask) if i == 2 => Some(mask),
+                    _ => inst.operands.get(i).copied(),
+                };
+                let operand = |i: usize| slot(i).map_or(0, |slot| slot.number);
+                let varying = |i: usize| u8::from(slot(i).is_some_and(|slot| slot.varying)) << i;
                 let instr = Instr {
                     d: inst
                         .results
@@ -49,8 +75,9 @@ impl<N: Number> Linked<N> {
                         .map_or(0, |slot| slot.number),
                     a: operand(0),
                     b: operand(1),
-                    c: inst.mask.map_or_else(|| operand(2), |mask| mask.number),
+                    c: operand(2),
                     e: operand(3),
+                    varying: varying(0) | varying(1) | varying(2) | varying(3),
                     index: index as u32,
                 };
                 (handler(inst, tier), instr)

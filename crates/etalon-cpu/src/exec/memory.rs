@@ -7,12 +7,13 @@ use super::state::{Resource, State};
 use super::tier::{Handler, Step, Tier};
 use crate::code::{CodeInst, Slot};
 use crate::ir::{AtomicFunction, Input, Memory, Op};
+use crate::memory::{Buffer, WideWords};
 use crate::num::Number;
 use crate::registers::{Class, LANES};
 
 /// How many times a handler must run its `K` lanes to fill a result.
 #[inline(always)]
-pub(super) fn rounds<N, const K: usize>(state: &State<'_, N>) -> usize {
+pub(super) fn rounds<N: Number, const K: usize>(state: &State<'_, N>) -> usize {
     if K == LANES { state.chunks } else { 1 }
 }
 
@@ -89,10 +90,24 @@ impl<N: Number, const K: usize> Step<N> for Table<K> {
     }
 }
 
-pub(super) fn words<'a, N>(state: &State<'a, N>, buffer: u16) -> (&'a [AtomicU32], u64) {
+fn buffer<'a, N: Number>(state: &State<'a, N>, buffer: u16) -> Option<&'a Buffer> {
     match state.resources.get(usize::from(buffer)) {
-        Some(&Resource::Buffer(words, bytes)) => (words, bytes),
-        _ => (&[], 0),
+        Some(&Resource::Buffer(buffer)) => Some(buffer),
+        _ => None,
+    }
+}
+
+pub(super) fn words<'a, N: Number>(state: &State<'a, N>, number: u16) -> &'a [AtomicU32] {
+    buffer(state, number).map_or(&[], Buffer::words)
+}
+
+/// The wide plane of a buffer, in number types that need one.
+#[inline(always)]
+fn wide_words<'a, N: Number>(state: &State<'a, N>, number: u16) -> Option<&'a WideWords> {
+    if N::WIDE {
+        buffer(state, number)?.wide()
+    } else {
+        None
     }
 }
 
@@ -121,20 +136,30 @@ impl<N: Number, const K: usize> Step<N> for BufferLoad<K> {
         let (Op::BufferLoad { buffer, offset, .. }, Some(to)) = (inst.op, result(inst)) else {
             return;
         };
-        let (words, _) = words(state, buffer);
+        let wide = match to.class {
+            Class::Float => wide_words(state, buffer),
+            Class::Int => None,
+        };
+        let words = words(state, buffer);
         for chunk in 0..rounds::<N, K>(state) {
             let index = indices::<N, K>(state, offset, inst.operands.first(), chunk);
             // Indices are clamped where they are computed; this is for buffers
             // that are smaller than declared.
-            state.set_bits::<K>(
-                to,
-                chunk,
-                &index.map(|index| {
-                    words
-                        .get(index)
-                        .map_or(0, |word| word.load(Ordering::Relaxed))
-                }),
-            );
+            let bits = index.map(|index| {
+                words
+                    .get(index)
+                    .map_or(0, |word| word.load(Ordering::Relaxed))
+            });
+            match wide {
+                None => state.set_bits(to, chunk, &bits),
+                Some(wide) => {
+                    let mut doubles = bits.map(|bits| f64::from(f32::from_bits(bits)));
+                    for k in 0..K {
+                        doubles[k] = wide.get(index[k]).unwrap_or(doubles[k]);
+                    }
+                    state.set_both(to, chunk, &bits, &doubles);
+                }
+            }
         }
     }
 }
@@ -148,7 +173,7 @@ impl<N: Number> Step<N> for BufferStore {
         let Op::BufferStore { buffer, offset, .. } = inst.op else {
             return;
         };
-        let (words, _) = words(state, buffer);
+        let words = words(state, buffer);
         for chunk in 0..state.chunks {
             let mask = state.mask(inst, chunk);
             let value: [u32; LANES] = state.bits(inst.operands[0], chunk);
@@ -159,6 +184,33 @@ impl<N: Number> Step<N> for BufferStore {
                 {
                     word.store(value[k], Ordering::Relaxed);
                 }
+            }
+            if let Some(wide) = wide_words(state, buffer) {
+                store_wide(state, wide, inst.operands[0], chunk, &mask, &index);
+            }
+        }
+    }
+}
+
+/// What a store leaves in the wide plane: numbers, or that there are none.
+fn store_wide<N: Number>(
+    state: &State<'_, N>,
+    wide: &WideWords,
+    value: Slot,
+    chunk: usize,
+    mask: &[u32; LANES],
+    index: &[usize; LANES],
+) {
+    match value.class {
+        Class::Float => {
+            let doubles: [f64; LANES] = state.doubles(value, chunk);
+            for k in (0..LANES).filter(|&k| mask[k] != 0) {
+                wide.set(index[k], doubles[k]);
+            }
+        }
+        Class::Int => {
+            for k in (0..LANES).filter(|&k| mask[k] != 0) {
+                wide.forget(index[k]);
             }
         }
     }
@@ -181,7 +233,7 @@ impl<N: Number> Step<N> for BufferLength {
         else {
             return;
         };
-        let (_, bytes) = words(state, buffer);
+        let bytes = self::buffer(state, buffer).map_or(0, Buffer::len);
         let length = bytes.saturating_sub(offset.into()) / u64::from(stride.max(1));
         state.set_ints(to, 0, &[u32::try_from(length).unwrap_or(u32::MAX)]);
     }
@@ -200,10 +252,13 @@ impl<N: Number> Step<N> for BufferAtomic {
         else {
             return;
         };
-        let (words, _) = words(state, buffer);
+        let (words, wide) = (words(state, buffer), wide_words(state, buffer));
         atomic(state, inst, function, |_, index, first, second| {
-            let word = words.get(offset as usize + index as usize)?;
-            Some(fetch(word, function, first, second))
+            let index = offset as usize + index as usize;
+            if let Some(wide) = wide {
+                wide.forget(index);
+            }
+            Some(fetch(words.get(index)?, function, first, second))
         });
     }
 }
@@ -330,7 +385,7 @@ impl<N: Number, const K: usize> Step<N> for MemoryLoad<K> {
                         state
                             .private_floats
                             .get(index[k] * chunks + chunk)
-                            .map_or_else(N::default, |lanes| lanes.0[k])
+                            .map_or_else(N::default, |lanes| N::get(lanes, k))
                     });
                     state.set_floats(to, chunk, &lanes);
                 }
@@ -370,15 +425,18 @@ impl<N: Number> Step<N> for MemoryStore {
                 Class::Float => {
                     let value: [N; LANES] = state.floats(inst.operands[0], chunk);
                     for k in (0..LANES).filter(|&k| mask[k] != 0) {
-                        let word = match memory {
-                            Memory::Workgroup => state.workgroup_floats.get_mut(index[k]),
-                            Memory::Private => state
-                                .private_floats
-                                .get_mut(index[k] * chunks + chunk)
-                                .map(|lanes| &mut lanes.0[k]),
-                        };
-                        if let Some(word) = word {
-                            *word = value[k];
+                        match memory {
+                            Memory::Workgroup => {
+                                if let Some(word) = state.workgroup_floats.get_mut(index[k]) {
+                                    *word = value[k];
+                                }
+                            }
+                            Memory::Private => {
+                                let lanes = state.private_floats.get_mut(index[k] * chunks + chunk);
+                                if let Some(lanes) = lanes {
+                                    N::set(lanes, k, value[k]);
+                                }
+                            }
                         }
                     }
                 }

@@ -27,12 +27,14 @@ mod texel_atomic;
 mod texels;
 #[allow(unsafe_code)]
 mod tier;
+mod wide;
 
 pub use dispatch::{DispatchCounters, Executor};
 pub use profile::{Cost, Profile, ProfiledInstruction};
 pub use tier::Tier;
 
 pub(crate) use dispatch::{DispatchFailure, Job};
+pub(crate) use lanes::Operands;
 pub(crate) use link::Linked;
 pub(crate) use profile::Recording;
 pub(crate) use state::{Failure, LocalIds, Resource};

@@ -1,19 +1,16 @@
 //! What a worker knows.
 
-use std::sync::atomic::AtomicU32;
-
 use etalon_core::resource::SamplerDesc;
 
 use crate::code::{Code, CodeInst, Slot};
-use crate::memory::TextureView;
+use crate::memory::{Buffer, TextureView};
 use crate::num::Number;
 use crate::registers::{Class, LANES, Lanes, Registers};
 
 /// Something bound.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Resource<'a> {
-    /// A buffer: its words, and its size in bytes.
-    Buffer(&'a [AtomicU32], u64),
+    Buffer(&'a Buffer),
     Texture(&'a TextureView<'a>),
     Sampler(SamplerDesc),
 }
@@ -65,11 +62,11 @@ pub(crate) enum Failure {
 }
 
 /// A worker's state.
-pub(crate) struct State<'a, N> {
+pub(crate) struct State<'a, N: Number> {
     pub(crate) registers: Registers<N>,
     /// Chunks of lanes in a register.
     pub(crate) chunks: usize,
-    pub(crate) private_floats: Vec<Lanes<N>>,
+    pub(crate) private_floats: Vec<N::Lanes>,
     pub(crate) private_ints: Vec<Lanes<u32>>,
     pub(crate) workgroup_floats: Vec<N>,
     pub(crate) workgroup_ints: Vec<u32>,
@@ -130,7 +127,12 @@ impl<'a, N: Number> State<'a, N> {
     #[inline(always)]
     pub(crate) fn floats<const K: usize>(&self, slot: Slot, chunk: usize) -> [N; K] {
         if slot.varying {
-            first(&self.registers.floats[self.at(slot.number, chunk)].0)
+            let lanes = &self.registers.floats[self.at(slot.number, chunk)];
+            let mut out = [N::default(); K];
+            for k in 0..K {
+                out[k] = N::get(lanes, k);
+            }
+            out
         } else {
             [self.registers.uniform_floats[usize::from(slot.number)]; K]
         }
@@ -142,14 +144,44 @@ impl<'a, N: Number> State<'a, N> {
         match slot.class {
             Class::Int => self.ints(slot, chunk),
             Class::Float => {
-                let floats = self.floats::<K>(slot, chunk);
+                let singles = self.singles::<K>(slot, chunk);
                 let mut bits = [0; K];
                 for k in 0..K {
-                    bits[k] = floats[k].to_f32().to_bits();
+                    bits[k] = singles[k].to_bits();
                 }
                 bits
             }
         }
+    }
+
+    /// The `f32` of the numbers of `K` lanes.
+    #[inline(always)]
+    pub(crate) fn singles<const K: usize>(&self, slot: Slot, chunk: usize) -> [f32; K] {
+        let mut out = [0.0; K];
+        if slot.varying {
+            let lanes = &self.registers.floats[self.at(slot.number, chunk)];
+            for k in 0..K {
+                out[k] = N::get(lanes, k).to_f32();
+            }
+        } else {
+            out = [self.registers.uniform_floats[usize::from(slot.number)].to_f32(); K];
+        }
+        out
+    }
+
+    /// The `f64` of the numbers of `K` lanes.
+    #[inline(always)]
+    pub(crate) fn doubles<const K: usize>(&self, slot: Slot, chunk: usize) -> [f64; K] {
+        let mut out = [0.0; K];
+        if slot.varying {
+            let lanes = &self.registers.floats[self.at(slot.number, chunk)];
+            for k in 0..K {
+                out[k] = N::get(lanes, k).to_f64();
+            }
+        } else {
+            out = [self.registers.uniform_floats[usize::from(slot.number)].to_f64(); K];
+        }
+        out
     }
 
     #[inline(always)]
@@ -166,7 +198,10 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn set_floats<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[N; K]) {
         if slot.varying {
             let at = self.at(slot.number, chunk);
-            self.registers.floats[at].0[..K].copy_from_slice(lanes);
+            let to = &mut self.registers.floats[at];
+            for k in 0..K {
+                N::set(to, k, lanes[k]);
+            }
         } else {
             self.registers.uniform_floats[usize::from(slot.number)] = lanes[0];
         }
@@ -176,13 +211,39 @@ impl<'a, N: Number> State<'a, N> {
     pub(crate) fn set_bits<const K: usize>(&mut self, slot: Slot, chunk: usize, lanes: &[u32; K]) {
         match slot.class {
             Class::Int => self.set_ints(slot, chunk, lanes),
-            Class::Float => {
-                let mut floats = [N::default(); K];
+            Class::Float if slot.varying => {
+                let at = self.at(slot.number, chunk);
+                let to = &mut self.registers.floats[at];
                 for k in 0..K {
-                    floats[k] = N::from_f32(f32::from_bits(lanes[k]));
+                    N::set(to, k, N::from_f32(f32::from_bits(lanes[k])));
                 }
-                self.set_floats(slot, chunk, &floats);
             }
+            Class::Float => {
+                let value = N::from_f32(f32::from_bits(lanes[0]));
+                self.registers.uniform_floats[usize::from(slot.number)] = value;
+            }
+        }
+    }
+
+    /// The numbers of `K` lanes whose texels or words are `singles`, as bits,
+    /// and which are `doubles` in the wide plane.
+    #[inline(always)]
+    pub(crate) fn set_both<const K: usize>(
+        &mut self,
+        slot: Slot,
+        chunk: usize,
+        singles: &[u32; K],
+        doubles: &[f64; K],
+    ) {
+        if slot.varying {
+            let at = self.at(slot.number, chunk);
+            let to = &mut self.registers.floats[at];
+            for k in 0..K {
+                N::set(to, k, N::from_both(f32::from_bits(singles[k]), doubles[k]));
+            }
+        } else {
+            let value = N::from_both(f32::from_bits(singles[0]), doubles[0]);
+            self.registers.uniform_floats[usize::from(slot.number)] = value;
         }
     }
 

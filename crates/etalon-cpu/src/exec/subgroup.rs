@@ -148,7 +148,7 @@ impl Group {
             return state.registers.uniform_floats[usize::from(slot.number)];
         }
         let (chunk, lane) = self.at(lane);
-        state.registers.floats[state.at(slot.number, chunk)].0[lane]
+        N::get(&state.registers.floats[state.at(slot.number, chunk)], lane)
     }
 
     /// Results always vary.
@@ -161,7 +161,7 @@ impl Group {
     fn set_float<N: Number>(&self, state: &mut State<'_, N>, slot: Slot, lane: usize, value: N) {
         let (chunk, lane) = self.at(lane);
         let at = state.at(slot.number, chunk);
-        state.registers.floats[at].0[lane] = value;
+        N::set(&mut state.registers.floats[at], lane, value);
     }
 
     fn scan<T: Copy + Default>(

@@ -15,7 +15,7 @@ use crate::num::{f16_to_f32, f32_to_f16};
 pub(super) const OUTSIDE: u32 = u32::MAX;
 
 /// A texel's bytes in memory, or half of them.
-trait Word: Sync {
+pub(super) trait Word: Sync {
     type Bits: Copy + Default;
     fn get(&self) -> Self::Bits;
     fn put(&self, bits: Self::Bits);
@@ -73,7 +73,10 @@ macro_rules! gathered {
     ($name:ident, $atomic:ty, $bits:ty, $gather:ident) => {
         /// [`load`] by the instruction set's gathers.
         #[inline(always)]
-        fn $name<I: Isa, const K: usize>(words: &[$atomic], index: &[u32; K]) -> [$bits; K] {
+        pub(super) fn $name<I: Isa, const K: usize>(
+            words: &[$atomic],
+            index: &[u32; K],
+        ) -> [$bits; K] {
             // Gathers take signed indices.
             if K % BLOCK != 0 || words.len() > i32::MAX as usize || !all_inside(words, index, 1) {
                 return load(words, index);
@@ -120,7 +123,7 @@ fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K
 
 /// Writes the words at `index`, those inside.
 #[inline(always)]
-fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
+pub(super) fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
     if all_inside(words, index, 1) {
         for k in 0..K {
             // SAFETY: all indices were seen to be inside.

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::wide::WideWords;
 use crate::error::RunError;
 
 /// Bytes a kernel reads and writes, as 32-bit words.
@@ -9,6 +10,7 @@ use crate::error::RunError;
 pub struct Buffer {
     words: Vec<AtomicU32>,
     bytes: u64,
+    wide: Option<WideWords>,
 }
 
 impl Buffer {
@@ -27,7 +29,72 @@ impl Buffer {
             .try_reserve_exact(count)
             .map_err(|_| out_of_memory())?;
         words.resize_with(count, || AtomicU32::new(0));
-        Ok(Self { words, bytes })
+        Ok(Self {
+            words,
+            bytes,
+            wide: None,
+        })
+    }
+
+    /// The buffer with a wide plane: an `f64` beside each word that was last
+    /// written as a floating-point number by a program of a
+    /// [number type](crate::NumberType) wider than `f32`.
+    ///
+    /// Such a program reads the `f64` back where it reads the word as a
+    /// floating-point number. The word has the nearest `f32`. A word that was
+    /// last written in another way, as an integer, by an atomic operation, from
+    /// outside, has no `f64`, and reading it as a number gives the `f32` whose
+    /// bits it has.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it: 8 bytes per word.
+    pub fn widen(mut self) -> Result<Self, RunError> {
+        if self.wide.is_none() {
+            self.wide = Some(WideWords::new(self.words.len() as u64)?);
+        }
+        Ok(self)
+    }
+
+    /// Whether there is a wide plane.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.wide.is_some()
+    }
+
+    /// For each word what it was last written as, if that was a floating-point
+    /// number and there is a wide plane.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn to_f64(&self) -> Result<Vec<Option<f64>>, RunError> {
+        let count = self.words.len();
+        let mut values = Vec::new();
+        values
+            .try_reserve_exact(count)
+            .map_err(|_| RunError::OutOfMemory {
+                what: "a buffer's contents".to_owned(),
+                bytes: (count as u64).saturating_mul(16),
+            })?;
+        let wide = self.wide.as_ref();
+        values.extend((0..count).map(|word| wide.and_then(|wide| wide.get(word))));
+        Ok(values)
+    }
+
+    pub(crate) fn wide(&self) -> Option<&WideWords> {
+        self.wide.as_ref()
+    }
+
+    fn forget_wide(&self) {
+        if let Some(wide) = &self.wide {
+            wide.forget_all();
+        }
+    }
+
+    /// Bytes held, those of a wide plane included.
+    #[must_use]
+    pub fn held_bytes(&self) -> u64 {
+        let wide = self.wide.as_ref().map_or(0, WideWords::bytes);
+        self.bytes.saturating_add(wide)
     }
 
     /// A buffer of the given bytes.
@@ -59,6 +126,7 @@ impl Buffer {
             value[..chunk.len()].copy_from_slice(chunk);
             *word.get_mut() = u32::from_le_bytes(value);
         }
+        self.forget_wide();
     }
 
     /// Sets every byte to zero.
@@ -66,12 +134,17 @@ impl Buffer {
         for word in &self.words {
             word.store(0, Ordering::Relaxed);
         }
+        self.forget_wide();
     }
 
     /// Copies as many bytes of another buffer as both have.
     pub fn copy_from(&self, source: &Self) {
         for (word, from) in self.words.iter().zip(&source.words) {
             word.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+        match (&self.wide, &source.wide) {
+            (Some(wide), Some(source)) => wide.copy_from(source),
+            _ => self.forget_wide(),
         }
     }
 

@@ -6,9 +6,11 @@
 mod buffer;
 mod texel;
 mod texture;
+mod wide;
 
 pub use buffer::Buffer;
 pub use texture::{Texture, TextureView};
 
 pub(crate) use texel::{Channels, decode, encode, unorm8};
 pub(crate) use texture::{Level, Texels};
+pub(crate) use wide::{WideTexels, WideWords, in_range};

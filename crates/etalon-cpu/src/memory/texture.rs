@@ -2,11 +2,13 @@
 
 use std::sync::atomic::{AtomicU8, AtomicU16, AtomicU32, AtomicU64, Ordering};
 
+use etalon_core::Format;
 use etalon_core::graph::Subresources;
 use etalon_core::image::ImageData;
 use etalon_core::resource::{Dimension, Extent, TextureDesc};
 use etalon_core::texel::Texel;
 
+use super::wide::{WideTexels, can_be_wide, in_range, widened};
 use crate::error::RunError;
 
 /// Texels of all mips and layers, in the order of [`ImageData`].
@@ -37,6 +39,7 @@ pub struct Texture {
     desc: TextureDesc,
     pub(crate) levels: Vec<Level>,
     pub(crate) texels: Texels,
+    wide: Option<WideTexels>,
 }
 
 macro_rules! each {
@@ -113,7 +116,56 @@ impl Texture {
             desc,
             levels,
             texels,
+            wide: None,
         })
+    }
+
+    /// The texture with a wide plane: an `f64` beside each channel, for
+    /// [number types](crate::NumberType) wider than `f32`. It starts with the
+    /// values of the texels. Formats of integers stay as they are.
+    ///
+    /// A store in such a number type keeps all digits of the value there, within
+    /// the range of the format (`[0, 1]` for normalised channels; floating-point
+    /// ones lose neither digits nor range), and a load returns them. The texels
+    /// get the value rounded, as ever. Everything else that writes texels
+    /// writes the plane alike.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it: 8 bytes per
+    /// channel.
+    pub fn widen(mut self) -> Result<Self, RunError> {
+        if can_be_wide(self.desc.format) && self.wide.is_none() {
+            let texels =
+                self.desc.bytes().unwrap_or(u64::MAX) / u64::from(self.desc.format.texel_bytes());
+            self.wide = Some(WideTexels::zeroed(texels, self.desc.format.channels())?);
+            self.refresh_wide();
+        }
+        Ok(self)
+    }
+
+    /// Whether textures of a format can have a wide plane: those that are read
+    /// as `f32`.
+    #[must_use]
+    pub fn can_be_wide(format: Format) -> bool {
+        can_be_wide(format)
+    }
+
+    /// Whether there is a wide plane.
+    #[must_use]
+    pub fn is_wide(&self) -> bool {
+        self.wide.is_some()
+    }
+
+    /// Sets the wide plane to the values of the texels.
+    fn refresh_wide(&self) {
+        let view = self.view();
+        if let Some(wide) = view.wide {
+            for index in view.indices().flatten() {
+                if let Some(value) = view.texel(index).and_then(widened) {
+                    wide.set(index, value);
+                }
+            }
+        }
     }
 
     /// A texture with an image's texels.
@@ -132,10 +184,11 @@ impl Texture {
         self.desc
     }
 
-    /// Bytes held.
+    /// Bytes held, those of a wide plane included.
     #[must_use]
     pub fn bytes(&self) -> u64 {
-        self.desc.bytes().unwrap_or(u64::MAX)
+        let wide = self.wide.as_ref().map_or(0, WideTexels::bytes);
+        self.desc.bytes().unwrap_or(u64::MAX).saturating_add(wide)
     }
 
     /// All mips and layers.
@@ -145,6 +198,7 @@ impl Texture {
             desc: self.desc,
             levels: self.levels.clone(),
             texels: &self.texels,
+            wide: self.wide.as_ref(),
         }
     }
 
@@ -168,6 +222,7 @@ impl Texture {
             desc,
             levels,
             texels: &self.texels,
+            wide: self.wide.as_ref(),
         })
     }
 
@@ -178,6 +233,7 @@ impl Texture {
                 *word.get_mut() = from_bytes(*chunk);
             }
         });
+        self.refresh_wide();
     }
 
     /// A copy of the texels.
@@ -223,6 +279,7 @@ pub struct TextureView<'a> {
     desc: TextureDesc,
     pub(crate) levels: Vec<Level>,
     pub(crate) texels: &'a Texels,
+    pub(crate) wide: Option<&'a WideTexels>,
 }
 
 impl TextureView<'_> {
@@ -245,6 +302,73 @@ impl TextureView<'_> {
                 ..start
                     + level.width as usize * level.height as usize * level.depth as usize * words
         })
+    }
+
+    /// The texels of each mip by their index.
+    fn indices(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        self.levels.iter().map(|level| {
+            let start = level.start as usize;
+            start..start + level.width as usize * level.height as usize * level.depth as usize
+        })
+    }
+
+    /// A texel by its index.
+    fn texel(&self, index: usize) -> Option<Texel> {
+        let mut bytes = [0; 16];
+        match self.texels {
+            Texels::B1(words) => bytes[0] = words.get(index)?.load(Ordering::Relaxed),
+            Texels::B2(words) => {
+                bytes[..2].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
+            Texels::B4(words) => {
+                bytes[..4].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
+            Texels::B8(words) => {
+                bytes[..8].copy_from_slice(&words.get(index)?.load(Ordering::Relaxed).to_le_bytes())
+            }
+            Texels::B16(words) => {
+                let at = index.checked_mul(2)?;
+                let words = words.get(at..at.checked_add(2)?)?;
+                for (bytes, word) in bytes.chunks_exact_mut(8).zip(words) {
+                    bytes.copy_from_slice(&word.load(Ordering::Relaxed).to_le_bytes());
+                }
+            }
+        }
+        Some(self.desc.format.decode(&bytes))
+    }
+
+    /// A texel by its index in `f64`: from the wide plane, or widened.
+    fn wide_texel(&self, index: usize) -> Option<[f64; 4]> {
+        match self.wide {
+            Some(wide) => wide.get(index),
+            None => self.texel(index).and_then(widened),
+        }
+    }
+
+    /// The channels of all texels in `f64`, in the order of [`ImageData`], where
+    /// channels that the format has not are 0, 0, 1: those of the wide plane, or
+    /// the texels' own without one. `None` for formats of integers.
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn to_f64(&self) -> Result<Option<Vec<[f64; 4]>>, RunError> {
+        if !can_be_wide(self.desc.format) {
+            return Ok(None);
+        }
+        let count = self.indices().map(|range| range.len()).sum();
+        let mut texels = Vec::new();
+        texels
+            .try_reserve_exact(count)
+            .map_err(|_| RunError::OutOfMemory {
+                what: "a copy of a texture".to_owned(),
+                bytes: (count as u64).saturating_mul(32),
+            })?;
+        texels.extend(
+            self.indices()
+                .flatten()
+                .filter_map(|index| self.wide_texel(index)),
+        );
+        Ok(Some(texels))
     }
 
     /// A copy of the texels.
@@ -281,6 +405,13 @@ impl TextureView<'_> {
                 word.store(from_bytes(*chunk), Ordering::Relaxed);
             });
         }
+        if let (Some(wide), Some(value)) = (self.wide, widened(texel)) {
+            let encoding = self.desc.format.encoding();
+            let value = value.map(|channel| in_range(encoding, channel));
+            for index in self.indices().flatten() {
+                wide.set(index, value);
+            }
+        }
     }
 
     /// Copies all texels of a part of equal shape; says whether it is one.
@@ -311,6 +442,13 @@ impl TextureView<'_> {
                 }
                 // One format has one texel size.
                 _ => return false,
+            }
+        }
+        if let Some(wide) = self.wide {
+            for (to, from) in self.indices().flatten().zip(source.indices().flatten()) {
+                if let Some(value) = source.wide_texel(from) {
+                    wide.set(to, value);
+                }
             }
         }
         true

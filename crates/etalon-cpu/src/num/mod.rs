@@ -1,21 +1,100 @@
 //! What the interpreter computes with.
 //!
 //! Every handler of floating-point instructions is generic over [`Number`], so
-//! that the same bytecode can run in other number types than the GPU's `f32`.
+//! that the same bytecode can run in other number types than the GPU's `f32`:
+//! see [`NumberType`].
 
+use std::fmt;
+
+mod double;
 mod elementary;
 mod half;
+mod shadow;
+mod single;
 
-pub(crate) use elementary::{atan2, cos, exp, exp2, log, log2, pow, sin, tan};
 pub(crate) use half::{f16_to_f32, f32_to_f16};
+pub(crate) use shadow::Shadow;
+
+use crate::exec::Operands;
+use crate::registers::Lane;
+
+/// The number type that a kernel's `f32` is computed in.
+///
+/// Literals and folded constants, uniforms, and the texels and words of
+/// resources without a wide plane are the `f32` of the kernel in every type.
+/// What is computed from them is kept in the type in registers and variables, in
+/// the memory of invocations and workgroups, and in textures and storage
+/// buffers that have a wide plane (see
+/// [`Texture::widen`](crate::Texture::widen),
+/// [`Buffer::widen`](crate::Buffer::widen)).
+///
+/// Integers are the same in every type, and so is whatever goes through them:
+/// a bit cast, packing or conversion to `f16` sees the bits of the nearest `f32`
+/// (in [`NumberType::Shadow`], of the `f32`), and a number made of bits is an
+/// `f32`. A kernel that rounds by operations on bits therefore rounds in every
+/// type, and one that takes numbers apart by them does so to `f32` accuracy.
+/// Coordinates, levels and weights of filtered reads are `f32` as well.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum NumberType {
+    /// As devices compute.
+    #[default]
+    F32,
+    /// Twice the precision, and its own range: the reference for rounding error.
+    ///
+    /// Control flow, addresses and conversions to integers follow the `f64`
+    /// values, so they may differ from those of the `f32` run. Transcendental
+    /// functions are within 4 units in the last place of `f64`, `pow(x, y)`
+    /// within `2 + |y| / 2`.
+    F64,
+    /// `f32` that decides everything, and beside it the `f64` that the same
+    /// operations make of the same inputs.
+    ///
+    /// Control flow, addresses, conversions and stored texels and words are bit
+    /// by bit those of the `f32` run. The other half follows: a comparison or
+    /// select goes the way of the `f32` values, while `min`, `max`, `sign`,
+    /// `floor` and the like are functions of the `f64` ones.
+    Shadow,
+}
+
+impl NumberType {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::F32, Self::F64, Self::Shadow];
+
+    /// Whether resources need a wide plane to hold its values.
+    #[must_use]
+    pub fn is_wide(self) -> bool {
+        self != Self::F32
+    }
+}
+
+impl fmt::Display for NumberType {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+            Self::Shadow => "f32 with f64 shadow",
+        })
+    }
+}
 
 /// One lane of a floating-point register.
 ///
 /// Integers, booleans and masks are the same in every number type; comparisons
 /// and conversions are where the two meet.
-pub(crate) trait Number: Copy + Default + Send + Sync + 'static {
+pub(crate) trait Number: Lane + Operands {
+    /// Whether there is more in a number than its `f32`: then memory has a wide
+    /// plane beside the texels and words.
+    const WIDE: bool;
+    /// Whether the `f32` is kept by itself, not only as the nearest one.
+    const HAS_SINGLE: bool;
+
     fn from_f32(value: f32) -> Self;
+    /// The nearest one.
     fn to_f32(self) -> f32;
+    fn to_f64(self) -> f64;
+    /// The number whose texel or word is `single`, and which is `double` in the
+    /// wide plane.
+    fn from_both(single: f32, double: f64) -> Self;
 
     fn add(self, other: Self) -> Self;
     fn sub(self, other: Self) -> Self;
@@ -90,246 +169,6 @@ pub(crate) trait Number: Copy + Default + Send + Sync + 'static {
 
     /// `self` where `mask` is all ones, `other` where it is all zeros.
     fn select(mask: u32, yes: Self, no: Self) -> Self;
-}
-
-impl Number for f32 {
-    #[inline(always)]
-    fn from_f32(value: f32) -> Self {
-        value
-    }
-    #[inline(always)]
-    fn to_f32(self) -> f32 {
-        self
-    }
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        self + other
-    }
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self - other
-    }
-    #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self * other
-    }
-    #[inline(always)]
-    fn div(self, other: Self) -> Self {
-        self / other
-    }
-    #[inline(always)]
-    fn rem(self, other: Self) -> Self {
-        self - other * Number::trunc(self / other)
-    }
-    #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        Number::select(mask((self < other) | other.is_nan()), self, other)
-    }
-    #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        Number::select(mask((self > other) | other.is_nan()), self, other)
-    }
-    #[inline(always)]
-    fn pow(self, other: Self) -> Self {
-        pow(self, other)
-    }
-    #[inline(always)]
-    fn atan2(self, other: Self) -> Self {
-        atan2(self, other)
-    }
-    #[inline(always)]
-    fn ldexp(self, exponent: i32) -> Self {
-        // Both factors are normal f64 for every exponent that can matter, and
-        // the product of an f32 with them is exact, so there is one rounding.
-        let exponent = exponent.clamp(-400, 400);
-        let power = f64::from_bits(((exponent + 1023) as u64) << 52);
-        (f64::from(self) * power) as f32
-    }
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        -self
-    }
-    #[inline(always)]
-    fn abs(self) -> Self {
-        f32::from_bits(self.to_bits() & 0x7fff_ffff)
-    }
-    #[inline(always)]
-    fn sign(self) -> Self {
-        let one = mask(self > 0.0) & 1.0_f32.to_bits();
-        let minus_one = mask(self < 0.0) & (-1.0_f32).to_bits();
-        f32::from_bits(one | minus_one)
-    }
-    #[inline(always)]
-    fn floor(self) -> Self {
-        self.floor()
-    }
-    #[inline(always)]
-    fn ceil(self) -> Self {
-        self.ceil()
-    }
-    #[inline(always)]
-    fn trunc(self) -> Self {
-        self.trunc()
-    }
-    #[inline(always)]
-    fn round(self) -> Self {
-        self.round_ties_even()
-    }
-    #[inline(always)]
-    fn floor_in_steps(self) -> Self {
-        let nearest = Number::round_in_steps(self);
-        let above = f32::from_bits(mask(nearest > self) & 1.0_f32.to_bits());
-        with_sign_of(nearest - above, self)
-    }
-    #[inline(always)]
-    fn ceil_in_steps(self) -> Self {
-        let nearest = Number::round_in_steps(self);
-        let below = f32::from_bits(mask(nearest < self) & 1.0_f32.to_bits());
-        with_sign_of(nearest + below, self)
-    }
-    #[inline(always)]
-    fn trunc_in_steps(self) -> Self {
-        let size = Number::abs(self);
-        with_sign_of(Number::floor_in_steps(size), self)
-    }
-    #[inline(always)]
-    fn round_in_steps(self) -> Self {
-        // From here on every number is an integer: the sum rounds to one.
-        const INTEGERS: f32 = 8_388_608.0;
-        let size = Number::abs(self);
-        let nearest = with_sign_of((size + INTEGERS) - INTEGERS, self);
-        Number::select(mask(size < INTEGERS), nearest, self)
-    }
-    #[inline(always)]
-    fn sqrt(self) -> Self {
-        self.sqrt()
-    }
-    #[inline(always)]
-    fn exp(self) -> Self {
-        exp(self)
-    }
-    #[inline(always)]
-    fn exp2(self) -> Self {
-        exp2(self)
-    }
-    #[inline(always)]
-    fn log(self) -> Self {
-        log(self)
-    }
-    #[inline(always)]
-    fn log2(self) -> Self {
-        log2(self)
-    }
-    #[inline(always)]
-    fn sin(self) -> Self {
-        sin(self)
-    }
-    #[inline(always)]
-    fn cos(self) -> Self {
-        cos(self)
-    }
-    #[inline(always)]
-    fn tan(self) -> Self {
-        tan(self)
-    }
-    #[inline(always)]
-    fn asin(self) -> Self {
-        f64::from(self).asin() as f32
-    }
-    #[inline(always)]
-    fn acos(self) -> Self {
-        f64::from(self).acos() as f32
-    }
-    #[inline(always)]
-    fn atan(self) -> Self {
-        f64::from(self).atan() as f32
-    }
-    #[inline(always)]
-    fn sinh(self) -> Self {
-        f64::from(self).sinh() as f32
-    }
-    #[inline(always)]
-    fn cosh(self) -> Self {
-        f64::from(self).cosh() as f32
-    }
-    #[inline(always)]
-    fn tanh(self) -> Self {
-        f64::from(self).tanh() as f32
-    }
-    #[inline(always)]
-    fn asinh(self) -> Self {
-        f64::from(self).asinh() as f32
-    }
-    #[inline(always)]
-    fn acosh(self) -> Self {
-        f64::from(self).acosh() as f32
-    }
-    #[inline(always)]
-    fn atanh(self) -> Self {
-        f64::from(self).atanh() as f32
-    }
-
-    #[inline(always)]
-    fn eq(self, other: Self) -> bool {
-        self == other
-    }
-    #[inline(always)]
-    fn lt(self, other: Self) -> bool {
-        self < other
-    }
-    #[inline(always)]
-    fn le(self, other: Self) -> bool {
-        self <= other
-    }
-
-    #[inline(always)]
-    fn to_i32(self) -> i32 {
-        let negative = mask(self < 0.0);
-        let magnitude = truncated_magnitude(self).min(0x7fff_ffff + (negative & 1));
-        let value = (magnitude ^ negative).wrapping_sub(negative);
-        (value & !mask(self.is_nan())) as i32
-    }
-    #[inline(always)]
-    fn to_u32(self) -> u32 {
-        truncated_magnitude(self) & mask(self > 0.0)
-    }
-    #[inline(always)]
-    fn from_i32(value: i32) -> Self {
-        value as f32
-    }
-    #[inline(always)]
-    fn from_u32(value: u32) -> Self {
-        value as f32
-    }
-
-    #[inline(always)]
-    fn select(mask: u32, yes: Self, no: Self) -> Self {
-        f32::from_bits((yes.to_bits() & mask) | (no.to_bits() & !mask))
-    }
-}
-
-/// The magnitude of one number, the sign of another.
-#[inline(always)]
-fn with_sign_of(magnitude: f32, sign: f32) -> f32 {
-    const SIGN: u32 = 0x8000_0000;
-    f32::from_bits((magnitude.to_bits() & !SIGN) | (sign.to_bits() & SIGN))
-}
-
-/// The integer part of `|x|`, at most `u32::MAX`; anything for NaN.
-///
-/// What `as` does, but as vector code: compilers leave saturating conversions
-/// scalar.
-#[inline(always)]
-fn truncated_magnitude(x: f32) -> u32 {
-    const LARGEST: f64 = u32::MAX as f64;
-    // From here on the unit of f64 is 1: adding rounds to the nearest integer.
-    const UNIT: f64 = 4_503_599_627_370_496.0;
-    let x = f64::from(Number::abs(x));
-    let x = if x < LARGEST { x } else { LARGEST };
-    let nearest = (x + UNIT) - UNIT;
-    let below = nearest - if nearest > x { 1.0 } else { 0.0 };
-    (below + UNIT).to_bits() as u32
 }
 
 /// All ones for true: how booleans are kept in integer registers.

@@ -4,7 +4,7 @@ use etalon_core::resource::Filter;
 
 use super::{Place, Request, cube};
 use crate::memory::Level;
-use crate::num::{Number, log2};
+use crate::num::Number;
 
 /// The level of detail that lanes ask for.
 pub(super) enum Lod<const K: usize> {
@@ -95,7 +95,7 @@ impl Request<'_> {
                 sum
             };
             let (x, y) = (square(along_x), square(along_y));
-            0.5 * log2(if x > y { x } else { y })
+            0.5 * Number::log2(if x > y { x } else { y })
         })
     }
 }

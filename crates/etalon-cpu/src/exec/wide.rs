@@ -1,0 +1,92 @@
+//! Texels in number types wider than `f32`: between wide planes and lanes.
+
+use etalon_core::Format;
+use etalon_core::format::Encoding;
+
+use super::isa::Isa;
+use super::state::State;
+use super::texels::{self, OUTSIDE};
+use crate::code::{CodeInst, Slot};
+use crate::memory::{WideTexels, in_range};
+use crate::num::Number;
+use crate::registers::LANES;
+
+/// Indices of a channel's words; outside stays outside.
+#[inline(always)]
+fn words_of<const K: usize>(index: &[u32; K], channels: u32, channel: u32) -> [u32; K] {
+    let mut at = [0; K];
+    for k in 0..K {
+        // Planes have fewer words than 2^32 - 4, see `WideTexels`: `OUTSIDE`
+        // wraps to one of the last indices, which is none.
+        at[k] = index[k].wrapping_mul(channels).wrapping_add(channel);
+    }
+    at
+}
+
+/// A channel of the texels at `index`; 0 outside.
+#[inline(always)]
+pub(super) fn channel<I: Isa, const K: usize>(
+    wide: &WideTexels,
+    index: &[u32; K],
+    channel: u32,
+) -> [f64; K] {
+    let mut out = [0.0; K];
+    if channel < wide.channels() {
+        let at = words_of(index, wide.channels(), channel);
+        let bits = texels::load8::<I, K>(wide.words(), &at);
+        for k in 0..K {
+            out[k] = f64::from_bits(bits[k]);
+        }
+    } else if channel == 3 {
+        for k in 0..K {
+            out[k] = if index[k] == OUTSIDE { 0.0 } else { 1.0 };
+        }
+    }
+    out
+}
+
+/// Sets the results of a load from the wide plane and, as far as the number
+/// type keeps them, the texels' `singles`.
+#[inline(always)]
+pub(super) fn load<I: Isa, N: Number, const K: usize>(
+    state: &mut State<'_, N>,
+    inst: &CodeInst,
+    wide: &WideTexels,
+    index: &[u32; K],
+    singles: &[[u32; K]; 4],
+    chunk: usize,
+) {
+    for (c, result) in inst.results.iter().enumerate().take(4) {
+        if let Some(to) = *result {
+            let doubles = channel::<I, K>(wide, index, c as u32);
+            state.set_both(to, chunk, &singles[c], &doubles);
+        }
+    }
+}
+
+/// Stores channels in the wide plane, where the index is inside.
+#[inline(always)]
+pub(super) fn store<N: Number>(
+    state: &State<'_, N>,
+    wide: &WideTexels,
+    format: Format,
+    index: &[u32; LANES],
+    values: &[Slot],
+    chunk: usize,
+) {
+    let encoding = format.encoding();
+    for (c, &slot) in (0..wide.channels()).zip(values) {
+        let mut value: [f64; LANES] = state.doubles(slot, chunk);
+        if encoding != Encoding::Float {
+            for k in 0..LANES {
+                value[k] = in_range(encoding, value[k]);
+            }
+        }
+        let at = words_of(index, wide.channels(), c);
+        let mut bits = [0; LANES];
+        for k in 0..LANES {
+            bits[k] = value[k].to_bits();
+        }
+        texels::store(wide.words(), &at, &bits);
+    }
+}

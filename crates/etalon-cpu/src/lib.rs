@@ -11,6 +11,10 @@
 //! subnormals, so results of `+ - * / sqrt` and of what is made from them are
 //! exactly those of strict devices. They do not depend on the instruction set
 //! or the number of threads, save for the payload of NaNs.
+//!
+//! A program can be translated with [`Checks`]: then it reports what a GPU hides,
+//! from accesses out of bounds to data races, at its place in the source. Without
+//! them its code has no trace of that.
 
 #![deny(unsafe_code)]
 
@@ -19,17 +23,20 @@ mod binding;
 mod code;
 mod error;
 mod exec;
+mod finding;
 mod ir;
 mod lower;
 mod memory;
 mod num;
 mod program;
 mod registers;
+mod report;
 mod translate;
 
-pub use backend::{CpuBackend, CpuOptions};
+pub use backend::{CpuBackend, CpuOptions, Findings, StepFinding};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
 pub use exec::{Cost, DispatchCounters, Executor, Profile, ProfiledInstruction, Tier};
+pub use finding::{Checks, Finding, FindingKind};
 pub use memory::{Buffer, Texture, TextureView};
-pub use program::{BoundResource, Program};
+pub use program::{BoundResource, DispatchReport, Program, TranslateOptions};

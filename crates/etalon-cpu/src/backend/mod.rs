@@ -1,5 +1,6 @@
 //! Running plans.
 
+mod findings;
 mod histories;
 mod pool;
 mod resources;
@@ -13,11 +14,13 @@ use etalon_core::kernel::{Kernel, KernelId};
 use etalon_core::plan::Plan;
 use etalon_core::resource::Limits;
 
+pub use self::findings::{Findings, StepFinding};
 use self::histories::Histories;
 use self::pool::Pool;
 use crate::error::RunError;
 use crate::exec::{Executor, Profile, Tier};
-use crate::program::Program;
+use crate::finding::Checks;
+use crate::program::{Program, TranslateOptions};
 
 /// How plans are run on the CPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +36,10 @@ pub struct CpuOptions {
     pub max_trips: u32,
     /// See [`Executor::with_profile`].
     pub profile: bool,
+    /// What to watch for; what is found is in [`CpuBackend::findings`]. Looking for
+    /// reads that nothing wrote also means that no two textures or buffers of a
+    /// plan share memory.
+    pub checks: Checks,
 }
 
 impl Default for CpuOptions {
@@ -43,6 +50,7 @@ impl Default for CpuOptions {
             lanes: Executor::DEFAULT_LANES,
             max_trips: Executor::DEFAULT_MAX_TRIPS,
             profile: false,
+            checks: Checks::NONE,
         }
     }
 }
@@ -55,6 +63,8 @@ pub struct CpuBackend {
     pool: Pool,
     histories: Histories,
     counters: Counters,
+    checks: Checks,
+    findings: Findings,
 }
 
 impl CpuBackend {
@@ -78,6 +88,8 @@ impl CpuBackend {
             pool: Pool::default(),
             histories: Histories::default(),
             counters: Counters::default(),
+            checks: options.checks,
+            findings: Findings::default(),
         })
     }
 
@@ -100,6 +112,17 @@ impl CpuBackend {
             .collect()
     }
 
+    /// What was found so far.
+    #[must_use]
+    pub fn findings(&self) -> &Findings {
+        &self.findings
+    }
+
+    /// What was found so far, which is forgotten.
+    pub fn take_findings(&mut self) -> Findings {
+        std::mem::take(&mut self.findings)
+    }
+
     /// The bytecode of a kernel, for reading; translated at most once.
     ///
     /// # Errors
@@ -117,9 +140,14 @@ impl CpuBackend {
     /// Translates a kernel unless that was done before.
     fn prepare(&mut self, step: &str, kernel: &Arc<Kernel>) -> Result<(), BackendError> {
         if let std::collections::hash_map::Entry::Vacant(entry) = self.programs.entry(kernel.id) {
-            let program = Program::translate(kernel).map_err(|error| BackendError::Kernel {
-                step: step.to_owned(),
-                error: Box::new(error),
+            let options = TranslateOptions {
+                checks: self.checks,
+            };
+            let program = Program::translate_with(kernel, &options).map_err(|error| {
+                BackendError::Kernel {
+                    step: step.to_owned(),
+                    error: Box::new(error),
+                }
             })?;
             entry.insert(program);
             self.counters.kernels += 1;

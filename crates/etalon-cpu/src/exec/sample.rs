@@ -11,7 +11,7 @@ use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
 use super::tier::{Handler, Step, Tier};
-use crate::ir::Op;
+use crate::ir::{ImageAccess, Op};
 use crate::memory::{Level, TextureView, decode};
 use crate::num::Number;
 use crate::registers::LANES;
@@ -73,6 +73,26 @@ impl<N: Number, const K: usize> Step<N> for Sample<K> {
             }
         }
     }
+}
+
+/// The first channel of one sample.
+pub(super) fn one(
+    texture: &TextureView<'_>,
+    sampler: SamplerDesc,
+    access: ImageAccess,
+    position: [f32; 3],
+    layer: u32,
+    lod: f32,
+) -> f32 {
+    let request = Request {
+        texture,
+        sampler,
+        wanted: [true, false, false, false],
+        layer: [layer],
+        cube: access.cube,
+        volume: access.coordinates == 3 && !access.cube,
+    };
+    request.run(&position.map(|axis| [axis]), &[lod])[0][0]
 }
 
 struct Request<'a, const K: usize> {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Arith, Class};
+use super::{Arith, Check, Class};
 
 /// What a kernel is told about its place in the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -148,6 +148,8 @@ pub(crate) enum Op {
     },
     /// Fails unless every invocation is active.
     Barrier,
+    /// Looks for what a GPU hides.
+    Check(Check),
 }
 
 impl Op {
@@ -213,6 +215,7 @@ impl Op {
                 | Self::WorkgroupAtomic { .. }
                 | Self::ImageStore { .. }
                 | Self::Barrier
+                | Self::Check(_)
         )
     }
 
@@ -291,6 +294,7 @@ impl fmt::Display for Op {
             }
             Self::ImageQuery { image, query } => write!(f, "image.query b{image} {query:?}"),
             Self::Barrier => f.write_str("barrier"),
+            Self::Check(check) => check.fmt(f),
         }
     }
 }

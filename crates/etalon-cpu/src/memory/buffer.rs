@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use super::written;
 use crate::error::RunError;
 
 /// Bytes a kernel reads and writes, as 32-bit words.
@@ -9,6 +10,8 @@ use crate::error::RunError;
 pub struct Buffer {
     words: Vec<AtomicU32>,
     bytes: u64,
+    /// Which words something wrote, if that is of interest.
+    shadow: Option<Vec<AtomicU32>>,
 }
 
 impl Buffer {
@@ -27,7 +30,37 @@ impl Buffer {
             .try_reserve_exact(count)
             .map_err(|_| out_of_memory())?;
         words.resize_with(count, || AtomicU32::new(0));
-        Ok(Self { words, bytes })
+        Ok(Self {
+            words,
+            bytes,
+            shadow: None,
+        })
+    }
+
+    /// A buffer that holds nothing yet: its words are zero, and reading one before
+    /// it is written is reported by programs that look for that
+    /// ([`crate::Checks::uninitialised`]).
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn unwritten(bytes: u64) -> Result<Self, RunError> {
+        let mut buffer = Self::zeroed(bytes)?;
+        buffer.forget()?;
+        Ok(buffer)
+    }
+
+    /// From here on the buffer counts as unwritten, whatever it holds.
+    pub(crate) fn forget(&mut self) -> Result<(), RunError> {
+        match &self.shadow {
+            Some(shadow) => written::forget(shadow),
+            None => self.shadow = Some(written::unwritten(self.words.len(), "a buffer")?),
+        }
+        Ok(())
+    }
+
+    /// What is known of which words are written.
+    pub(crate) fn shadow(&self) -> Option<&[AtomicU32]> {
+        self.shadow.as_deref()
     }
 
     /// A buffer of the given bytes.
@@ -59,6 +92,9 @@ impl Buffer {
             value[..chunk.len()].copy_from_slice(chunk);
             *word.get_mut() = u32::from_le_bytes(value);
         }
+        if let Some(shadow) = &self.shadow {
+            written::write(&shadow[..bytes.len().div_ceil(4).min(shadow.len())]);
+        }
     }
 
     /// Sets every byte to zero.
@@ -66,12 +102,20 @@ impl Buffer {
         for word in &self.words {
             word.store(0, Ordering::Relaxed);
         }
+        if let Some(shadow) = &self.shadow {
+            written::write(shadow);
+        }
     }
 
     /// Copies as many bytes of another buffer as both have.
     pub fn copy_from(&self, source: &Self) {
         for (word, from) in self.words.iter().zip(&source.words) {
             word.store(from.load(Ordering::Relaxed), Ordering::Relaxed);
+        }
+        if let Some(shadow) = &self.shadow {
+            for (i, word) in shadow.iter().enumerate().take(source.words.len()) {
+                written::copy(word, source.shadow.as_ref().and_then(|from| from.get(i)));
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 mod buffer;
 mod texel;
 mod texture;
+pub(crate) mod written;
 
 pub use buffer::Buffer;
 pub use texture::{Texture, TextureView};

@@ -4,7 +4,7 @@ use naga::{Expression, Handle, ImageClass, SampleLevel, TypeInner};
 
 use super::{Fail, Frame, Translator};
 use crate::binding::{BindingKind, ChannelKind, View};
-use crate::ir::{Class, ImageAccess, ImageQuery, Op, Value};
+use crate::ir::{Access, Class, ImageAccess, ImageQuery, Op, Value};
 
 impl<'a> Translator<'a> {
     fn access(&self, image: u16, sampled: bool) -> Result<ImageAccess, Fail> {
@@ -107,6 +107,8 @@ impl<'a> Translator<'a> {
         if let Some(level) = level {
             operands.push(self.scalar(frame, level)?);
         }
+        let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
+        self.check_texel(access, level.is_some(), signed, Access::Read, &operands);
         let mut values = self.builder.op(
             Op::ImageLoad {
                 access,
@@ -132,6 +134,8 @@ impl<'a> Translator<'a> {
         let access = self.access(image, false)?;
         let class = self.channel_class(image);
         let mut operands = self.coordinates(frame, access, coordinate, layer)?;
+        let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
+        self.check_texel(access, false, signed, Access::Write, &operands);
         operands.extend(self.scalars(frame, value)?);
         self.builder
             .op(Op::ImageStore { access, class }, &operands, &[]);
@@ -191,6 +195,7 @@ impl<'a> Translator<'a> {
             SampleLevel::Exact(level) => self.scalar(frame, level)?,
             _ => self.builder.float(0.0),
         });
+        self.check_sample(access, sampler, &operands);
         let mut values = self.builder.op(
             Op::ImageSample { access, sampler },
             &operands,
@@ -225,6 +230,7 @@ impl<'a> Translator<'a> {
                     Some(level) => self.scalar(frame, level)?,
                     None => self.builder.int(0),
                 };
+                self.check_level(image, level);
                 (0..if three { 3 } else { 2 })
                     .map(|axis| {
                         self.builder.op(

@@ -44,10 +44,26 @@ pub(crate) struct CodeInst {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum End {
     Jump(u32),
-    Branch { condition: Slot, yes: u32, no: u32 },
-    Any { mask: Slot, yes: u32, no: u32 },
-    Enter { counter: u32, head: u32 },
-    Again { counter: u32, head: u32 },
+    Branch {
+        condition: Slot,
+        yes: u32,
+        no: u32,
+    },
+    Any {
+        mask: Slot,
+        yes: u32,
+        no: u32,
+    },
+    Enter {
+        counter: u32,
+        head: u32,
+    },
+    Again {
+        counter: u32,
+        head: u32,
+        end: u32,
+        mask: Option<Slot>,
+    },
     Stop,
 }
 
@@ -141,9 +157,16 @@ impl Code {
                     counter,
                     head: at(head),
                 },
-                Terminator::Again { counter, head } => End::Again {
+                Terminator::Again {
+                    counter,
+                    head,
+                    end,
+                    mask,
+                } => End::Again {
                     counter,
                     head: at(head),
+                    end: at(end),
+                    mask: mask.map(slot),
                 },
                 Terminator::End => End::Stop,
             };
@@ -223,7 +246,9 @@ impl fmt::Display for Code {
                 }
                 End::Any { mask, yes, no } => writeln!(f, "    any {mask} jump {yes} else {no}")?,
                 End::Enter { counter, head } => writeln!(f, "    enter loop {counter} at {head}")?,
-                End::Again { counter, head } => writeln!(f, "    repeat loop {counter} at {head}")?,
+                End::Again { counter, head, .. } => {
+                    writeln!(f, "    repeat loop {counter} at {head}")?
+                }
                 End::Stop => writeln!(f, "    end")?,
             }
         }

@@ -5,7 +5,7 @@ use std::fmt;
 use thiserror::Error;
 
 /// A place in a kernel's source.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Location {
     /// The file, or the kernel's name.
     pub file: String,
@@ -64,12 +64,21 @@ pub enum TranslateError {
     },
 }
 
+/// As an identifier is written in messages.
+pub(crate) fn triple([x, y, z]: &[u32; 3]) -> String {
+    format!("({x},{y},{z})")
+}
+
 /// Why a dispatch failed.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum RunError {
     /// A loop did not end within the limit.
-    #[error("{location}: a loop of kernel {kernel} ran {limit} times without ending")]
+    #[error(
+        "{location}: a loop of kernel {kernel} ran {limit} times without ending (workgroup {}, invocation {})",
+        triple(workgroup),
+        triple(invocation)
+    )]
     EndlessLoop {
         /// The kernel.
         kernel: String,
@@ -77,16 +86,26 @@ pub enum RunError {
         location: Location,
         /// The limit.
         limit: u32,
+        /// `workgroup_id` of the first workgroup that it happened in.
+        workgroup: [u32; 3],
+        /// `local_invocation_id` of the first invocation that was still in the loop.
+        invocation: [u32; 3],
     },
     /// A barrier was reached by a part of a workgroup only.
     #[error(
-        "{location}: a barrier of kernel {kernel} is in control flow that differs within a workgroup"
+        "{location}: a barrier of kernel {kernel} is in control flow that differs within a workgroup (workgroup {}, without invocation {})",
+        triple(workgroup),
+        triple(invocation)
     )]
     DivergentBarrier {
         /// The kernel.
         kernel: String,
         /// The barrier.
         location: Location,
+        /// `workgroup_id` of the first workgroup that it happened in.
+        workgroup: [u32; 3],
+        /// `local_invocation_id` of the first invocation that did not reach it.
+        invocation: [u32; 3],
     },
     /// Nothing, or the wrong kind of thing, is bound.
     #[error("kernel {kernel}: `{binding}` needs {expected}, but {found} is bound")]

@@ -12,6 +12,10 @@
 //! exactly those of strict devices. They do not depend on the instruction set
 //! or the number of threads, save for the payload of NaNs. [`semantics`] says
 //! operation by operation what is computed.
+//!
+//! A program can be translated with [`Checks`]: then it reports what a GPU hides,
+//! from accesses out of bounds to data races, at its place in the source. Without
+//! them its code has no trace of that.
 
 #![deny(unsafe_code)]
 
@@ -20,6 +24,7 @@ mod binding;
 mod code;
 mod error;
 mod exec;
+mod finding;
 mod ir;
 mod lower;
 mod memory;
@@ -27,12 +32,15 @@ mod num;
 mod program;
 mod registers;
 pub mod semantics;
+
+mod report;
 mod translate;
 
-pub use backend::{CpuBackend, CpuOptions, WideCapture, WideExecution};
+pub use backend::{CpuBackend, CpuOptions, Findings, StepFinding, WideCapture, WideExecution};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
 pub use exec::{Cost, DispatchCounters, Executor, Profile, ProfiledInstruction, Tier};
+pub use finding::{Checks, Finding, FindingKind};
 pub use memory::{Buffer, Texture, TextureView};
 pub use num::NumberType;
-pub use program::{BoundResource, Program};
+pub use program::{BoundResource, DispatchReport, Program, TranslateOptions};

@@ -12,8 +12,10 @@ use crate::binding::{BindingInfo, BindingKind, ChannelKind, View};
 use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
 use crate::exec::{DispatchCounters, Executor, Linked, Profile, Recording, Resource, Tier};
-use crate::memory::{Buffer, TextureView};
+use crate::finding::{Checks, Finding};
+use crate::memory::{Buffer, TextureView, written};
 use crate::num::{Number, NumberType, Shadow};
+use crate::report::workgroup_id;
 use crate::translate::{self, Fail};
 use crate::{exec, lower};
 
@@ -22,16 +24,35 @@ use crate::{exec, lower};
 /// [`Display`](fmt::Display) lists the code.
 pub struct Program {
     name: String,
-    workgroup_size: [u32; 3],
-    bindings: Vec<BindingInfo>,
+    pub(crate) workgroup_size: [u32; 3],
+    pub(crate) bindings: Vec<BindingInfo>,
     immediates: Option<u32>,
-    code: Code,
+    pub(crate) code: Code,
     local_ids: exec::LocalIds,
     singles: ByTier<f32>,
     doubles: ByTier<f64>,
-    shadows: ByTier<Shadow>,
+    shadowed: ByTier<Shadow>,
     recording: Mutex<Recording>,
-    locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
+    pub(crate) locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
+}
+
+/// How a kernel is made into a program.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TranslateOptions {
+    /// What the program watches for while it runs. Without checks there is no
+    /// trace of them in its code.
+    pub checks: Checks,
+}
+
+/// What a dispatch did.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DispatchReport {
+    /// How much was run.
+    pub counters: DispatchCounters,
+    /// What the program's checks found: one entry for each kind and place, in the
+    /// order of the source. The same at any number of threads and lanes and on any
+    /// instruction set.
+    pub findings: Vec<Finding>,
 }
 
 /// The code linked to the handlers of a number type, by instruction set; each
@@ -81,12 +102,29 @@ impl Program {
         info: &ModuleInfo,
         entry_point: &str,
     ) -> Result<Self, TranslateError> {
+        let options = TranslateOptions::default();
+        Self::from_module_with(name, source, module, info, entry_point, &options)
+    }
+
+    /// [`Program::from_module`] with options.
+    ///
+    /// # Errors
+    /// As [`Program::from_module`].
+    pub fn from_module_with(
+        name: &str,
+        source: &str,
+        module: &Module,
+        info: &ModuleInfo,
+        entry_point: &str,
+        options: &TranslateOptions,
+    ) -> Result<Self, TranslateError> {
         Self::new(
             name.to_owned(),
             Box::new(locate_in(name.to_owned(), source.to_owned())),
             module,
             info,
             entry_point,
+            options,
         )
     }
 
@@ -95,6 +133,17 @@ impl Program {
     /// # Errors
     /// [`TranslateError`] if the kernel uses what the interpreter does not have.
     pub fn translate(kernel: &Arc<Kernel>) -> Result<Self, TranslateError> {
+        Self::translate_with(kernel, &TranslateOptions::default())
+    }
+
+    /// [`Program::translate`] with options.
+    ///
+    /// # Errors
+    /// As [`Program::translate`].
+    pub fn translate_with(
+        kernel: &Arc<Kernel>,
+        options: &TranslateOptions,
+    ) -> Result<Self, TranslateError> {
         let source = Arc::clone(kernel);
         let locate = move |span| {
             let place = source.source_map.locate(span);
@@ -110,6 +159,7 @@ impl Program {
             &kernel.module,
             &kernel.info,
             &kernel.entry_point,
+            options,
         )
     }
 
@@ -119,6 +169,7 @@ impl Program {
         module: &Module,
         info: &ModuleInfo,
         entry_point: &str,
+        options: &TranslateOptions,
     ) -> Result<Self, TranslateError> {
         let Some(index) = module
             .entry_points
@@ -170,7 +221,7 @@ impl Program {
                 limit: MAX_INVOCATIONS.into(),
             });
         };
-        let translation = translate::translate(module, info, index).map_err(&explain)?;
+        let translation = translate::translate(module, info, index, options).map_err(&explain)?;
         let partial = invocations % crate::registers::LANES as u32 != 0;
         let flat = lower::lower(translation.tree, partial);
         let code = Code::new(&flat, &lower::allocate(&flat))
@@ -184,7 +235,7 @@ impl Program {
             local_ids: exec::LocalIds::new(workgroup_size),
             singles: Default::default(),
             doubles: Default::default(),
-            shadows: Default::default(),
+            shadowed: Default::default(),
             recording: Mutex::default(),
             locate,
         })
@@ -214,6 +265,12 @@ impl Program {
         self.immediates.unwrap_or(0)
     }
 
+    /// What the program watches for.
+    #[must_use]
+    pub fn checks(&self) -> Checks {
+        self.code.resources.checks
+    }
+
     /// Runs a number of workgroups along each axis and waits for them.
     /// `resources` are in the order of [`Program::bindings`]. For kernels that
     /// have no immediate data.
@@ -227,7 +284,7 @@ impl Program {
         executor: &Executor,
         workgroups: [u32; 3],
         resources: &[BoundResource<'_>],
-    ) -> Result<DispatchCounters, RunError> {
+    ) -> Result<DispatchReport, RunError> {
         self.dispatch_with_immediates(executor, workgroups, resources, &[])
     }
 
@@ -243,7 +300,7 @@ impl Program {
         workgroups: [u32; 3],
         resources: &[BoundResource<'_>],
         immediates: &[u8],
-    ) -> Result<DispatchCounters, RunError> {
+    ) -> Result<DispatchReport, RunError> {
         let need = self.immediate_size();
         if immediates.len() < need as usize {
             return Err(RunError::Binding {
@@ -261,9 +318,9 @@ impl Program {
         // Where translation has put it.
         bound.push(Resource::Buffer(&immediates));
         match executor.number_type() {
-            NumberType::F32 => self.run(executor, workgroups, &bound, &self.singles),
-            NumberType::F64 => self.run(executor, workgroups, &bound, &self.doubles),
-            NumberType::Shadow => self.run(executor, workgroups, &bound, &self.shadows),
+            NumberType::F32 => self.run(executor, workgroups, resources, &bound, &self.singles),
+            NumberType::F64 => self.run(executor, workgroups, resources, &bound, &self.doubles),
+            NumberType::Shadow => self.run(executor, workgroups, resources, &bound, &self.shadowed),
         }
     }
 
@@ -271,10 +328,12 @@ impl Program {
         &self,
         executor: &Executor,
         workgroups: [u32; 3],
+        bound: &[BoundResource<'_>],
         resources: &[Resource<'_>],
         linked: &ByTier<N>,
-    ) -> Result<DispatchCounters, RunError> {
+    ) -> Result<DispatchReport, RunError> {
         let tier = executor.tier();
+        let shadows = self.shadows(bound);
         let job = exec::Job {
             code: &self.code,
             linked: linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier)),
@@ -282,9 +341,14 @@ impl Program {
             local_ids: &self.local_ids,
             invocations: self.workgroup_size.iter().product(),
             recording: executor.profiles().then_some(&self.recording),
+            shadows: &shadows,
         };
-        job.run(executor, workgroups)
-            .map_err(|failure| self.explain(failure, workgroups))
+        let (counters, found) = job
+            .run(executor, workgroups)
+            .map_err(|failure| self.explain(failure, workgroups))?;
+        let findings = self.findings(found.finish(&shadows), workgroups);
+        self.settle(&shadows, bound);
+        Ok(DispatchReport { counters, findings })
     }
 
     /// What its instructions have cost in dispatches by executors that
@@ -296,35 +360,81 @@ impl Program {
         recording.profile(&self.name, &self.code, &*self.locate)
     }
 
-    fn explain(&self, failure: exec::DispatchFailure, [x, y, z]: [u32; 3]) -> RunError {
+    /// The shadows of what is bound.
+    fn shadows<'a>(&self, resources: &'a [BoundResource<'a>]) -> Vec<exec::Shadow<'a>> {
+        if !self.checks().any() {
+            return Vec::new();
+        }
+        self.bindings
+            .iter()
+            .zip(resources)
+            .map(|(binding, resource)| {
+                let (words, view) = match resource {
+                    BoundResource::Buffer(buffer) => (buffer.shadow(), None),
+                    BoundResource::Texture(texture) => (texture.shadow(), texture.shadow_view()),
+                    BoundResource::Sampler(_) => (None, None),
+                };
+                exec::Shadow {
+                    words,
+                    view,
+                    writable: binding.is_writable(),
+                }
+            })
+            .collect()
+    }
+
+    /// After a dispatch: what it wrote is written. A program that did not watch may
+    /// have written all that it can write.
+    fn settle(&self, shadows: &[exec::Shadow<'_>], resources: &[BoundResource<'_>]) {
+        if self.checks().uninitialised {
+            for shadow in shadows.iter().filter(|shadow| shadow.writable) {
+                shadow.words.into_iter().for_each(written::settle);
+            }
+            return;
+        }
+        for (binding, resource) in self.bindings.iter().zip(resources) {
+            if binding.is_writable() {
+                match resource {
+                    BoundResource::Buffer(buffer) => {
+                        buffer.shadow().into_iter().for_each(written::write);
+                    }
+                    BoundResource::Texture(texture) => texture.note_written(),
+                    BoundResource::Sampler(_) => {}
+                }
+            }
+        }
+    }
+
+    fn explain(&self, failure: exec::DispatchFailure, workgroups: [u32; 3]) -> RunError {
         let kernel = self.name.clone();
         match failure {
-            exec::DispatchFailure::Failed(exec::Failure::EndlessLoop(index), limit) => {
-                let span = self
-                    .code
-                    .loops
-                    .get(index as usize)
-                    .copied()
-                    .unwrap_or_default();
-                RunError::EndlessLoop {
-                    kernel,
-                    location: (self.locate)(span),
-                    limit,
-                }
-            }
-            exec::DispatchFailure::Failed(exec::Failure::DivergentBarrier(index), _) => {
-                let span = self
-                    .code
-                    .insts
-                    .get(index as usize)
-                    .map(|inst| inst.span)
-                    .unwrap_or_default();
-                RunError::DivergentBarrier {
-                    kernel,
-                    location: (self.locate)(span),
-                }
-            }
+            exec::DispatchFailure::Failed(
+                exec::Failure::EndlessLoop {
+                    counter,
+                    invocation,
+                    ..
+                },
+                workgroup,
+                limit,
+            ) => RunError::EndlessLoop {
+                kernel,
+                location: (self.locate)(self.span(exec::Site::Loop(counter))),
+                limit,
+                workgroup: workgroup_id(workgroup, workgroups),
+                invocation: self.invocation_id(invocation),
+            },
+            exec::DispatchFailure::Failed(
+                exec::Failure::DivergentBarrier { inst, invocation },
+                workgroup,
+                _,
+            ) => RunError::DivergentBarrier {
+                kernel,
+                location: (self.locate)(self.span(exec::Site::Inst(inst))),
+                workgroup: workgroup_id(workgroup, workgroups),
+                invocation: self.invocation_id(invocation),
+            },
             exec::DispatchFailure::TooManyWorkgroups => {
+                let [x, y, z] = workgroups;
                 RunError::TooManyWorkgroups { kernel, x, y, z }
             }
             exec::DispatchFailure::OutOfMemory(bytes) => RunError::OutOfMemory {

@@ -403,6 +403,29 @@ fn barriers_in_divergent_control_flow_are_refused() {
     assert_eq!(location.line, 8);
 }
 
+/// A barrier holds back all of a workgroup, also one that shares storage only and
+/// is larger than what runs together otherwise.
+#[test]
+fn storage_is_ordered_by_barriers() {
+    let got = run_buffers(
+        &format!(
+            "{HEAD} @compute @workgroup_size(128)
+            fn main(@builtin(local_invocation_index) i: u32) {{
+                result[i] = i + 1u;
+                storageBarrier();
+                let other = result[(i + 70u) % 128u];
+                storageBarrier();
+                result[i] = other;
+            }}"
+        ),
+        &[0],
+        128,
+        1,
+    );
+    let expected: Vec<u32> = (0..128).map(|i| (i + 70) % 128 + 1).collect();
+    assert_eq!(got, expected);
+}
+
 #[test]
 fn bindings_are_checked() {
     let program = program(&format!(

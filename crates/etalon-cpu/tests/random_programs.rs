@@ -1,11 +1,14 @@
 //! Random programs with nested, divergent control flow against an evaluation
-//! of the same program one invocation at a time.
+//! of the same program one invocation at a time: results, and which indices are
+//! outside of an array.
 
 mod common;
 
+use std::cell::Cell;
 use std::fmt::Write as _;
 
 use common::*;
+use etalon_cpu::{BoundResource, Checks, Executor, Finding, FindingKind};
 
 const VARIABLES: usize = 5;
 
@@ -155,7 +158,8 @@ fn expr_text(expr: &Expr) -> String {
         Expr::Xor(a, b) => format!("({} ^ {})", expr_text(a), expr_text(b)),
         Expr::Shift(a) => format!("({} >> 1u)", expr_text(a)),
         Expr::Call(a, b) => format!("helper({}, {})", expr_text(a), expr_text(b)),
-        Expr::Element(a) => format!("elements[{} & 3u]", expr_text(a)),
+        // The parser refuses constants outside; so it sees none.
+        Expr::Element(a) => format!("elements[({} ^ (lane & 0u)) & 7u]", expr_text(a)),
     }
 }
 
@@ -174,7 +178,7 @@ fn block_text(block: &[Stmt], loops: usize, out: &mut String) {
             Stmt::Assign(i, value) => writeln!(out, "v{i} = {};", expr_text(value)).unwrap(),
             Stmt::SetElement(i, value) => writeln!(
                 out,
-                "elements[{} & 3u] = {};",
+                "elements[({} ^ (lane & 0u)) & 7u] = {};",
                 expr_text(i),
                 expr_text(value)
             )
@@ -243,6 +247,8 @@ struct Invocation {
     counters: Vec<u32>,
     lane: u32,
     group: u32,
+    /// How often an index was outside of the array.
+    outside: Cell<u64>,
 }
 
 fn helper(a: u32, b: u32) -> u32 {
@@ -258,6 +264,15 @@ fn helper(a: u32, b: u32) -> u32 {
 }
 
 impl Invocation {
+    /// Which element an index means: the last where there is none.
+    fn element(&self, index: u32) -> usize {
+        let index = index & 7;
+        if index > 3 {
+            self.outside.set(self.outside.get() + 1);
+        }
+        index.min(3) as usize
+    }
+
     fn expr(&self, expr: &Expr) -> u32 {
         match expr {
             Expr::Constant(value) => *value,
@@ -270,7 +285,7 @@ impl Invocation {
             Expr::Xor(a, b) => self.expr(a) ^ self.expr(b),
             Expr::Shift(a) => self.expr(a) >> 1,
             Expr::Call(a, b) => helper(self.expr(a), self.expr(b)),
-            Expr::Element(a) => self.elements[(self.expr(a) & 3) as usize],
+            Expr::Element(a) => self.elements[self.element(self.expr(a))],
         }
     }
 
@@ -297,7 +312,8 @@ impl Invocation {
         match stmt {
             Stmt::Assign(i, value) => self.variables[*i] = self.expr(value),
             Stmt::SetElement(i, value) => {
-                self.elements[(self.expr(i) & 3) as usize] = self.expr(value)
+                let element = self.element(self.expr(i));
+                self.elements[element] = self.expr(value)
             }
             Stmt::If(condition, accept, reject) => {
                 return if self.holds(condition) {
@@ -404,6 +420,8 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
         .map(|i| i.wrapping_mul(2_654_435_761) >> 27)
         .collect();
     let result = run_buffers(&wgsl, &data, (groups * size) as usize * VARIABLES, groups);
+    // How often an index is outside of the array, and who is the first to have one.
+    let (mut outside, mut first) = (0, None);
     for group in 0..groups {
         for lane in 0..size {
             let mut invocation = Invocation {
@@ -412,6 +430,7 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
                 counters: Vec::new(),
                 lane,
                 group,
+                outside: Cell::new(0),
             };
             let returned = invocation.block(body) == Flow::Return;
             let mut expected = invocation.variables;
@@ -419,6 +438,10 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
                 for (value, element) in expected.iter_mut().zip(invocation.elements) {
                     *value = value.wrapping_add(element);
                 }
+            }
+            outside += invocation.outside.get();
+            if outside > 0 && first.is_none() {
+                first = Some((group, lane));
             }
             let at = (group * size + lane) as usize * VARIABLES;
             let got = &result[at..at + VARIABLES];
@@ -430,7 +453,47 @@ fn mistake(body: &[Stmt], size: u32) -> Option<String> {
             }
         }
     }
-    None
+    let found = findings(&wgsl, &data, (groups * size) as usize * VARIABLES, groups);
+    let count: u64 = found.iter().map(|finding| finding.count).sum();
+    let found_first = found
+        .iter()
+        .map(|finding| (finding.workgroup[0], finding.invocation[0]))
+        .min();
+    let other = found
+        .iter()
+        .any(|finding| finding.kind != FindingKind::Index);
+    (other || count != outside || found_first != first).then(|| {
+        format!(
+            "{outside} indices outside, the first of {first:?}, but found are {found:#?}\n{wgsl}"
+        )
+    })
+}
+
+/// What all checks find, the same in two ways of running.
+fn findings(wgsl: &str, data: &[u32], results: usize, workgroups: u32) -> Vec<Finding> {
+    let program = checks::checked(wgsl, Checks::all());
+    let run = |threads, lanes| {
+        let executor = Executor::new(threads).unwrap().with_lanes(lanes);
+        let (input, output) = (buffer(data), buffer(&vec![0; results]));
+        let bound: Vec<BoundResource<'_>> = program
+            .bindings()
+            .iter()
+            .map(|binding| {
+                BoundResource::Buffer(if binding.binding == 0 {
+                    &input
+                } else {
+                    &output
+                })
+            })
+            .collect();
+        program
+            .dispatch(&executor, [workgroups, 1, 1], &bound)
+            .unwrap_or_else(|error| panic!("{error}\n{program}"))
+            .findings
+    };
+    let found = run(1, 64);
+    assert_eq!(found, run(3, 256), "{wgsl}");
+    found
 }
 
 #[test]

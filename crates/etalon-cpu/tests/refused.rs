@@ -157,6 +157,7 @@ fn entry_points_are_found_by_name() {
     let program = Program::from_module("test", wgsl, &module, &info, "other").unwrap();
     let counters = program
         .dispatch(&Executor::new(1).unwrap(), [2, 3, 4], &[])
-        .unwrap();
+        .unwrap()
+        .counters;
     assert_eq!((counters.workgroups, counters.invocations), (24, 24));
 }

@@ -1,23 +1,58 @@
 //! Opens the backend a job asks for.
 
 use etalon::ash::{AshBackend, AshOptions, Validation};
-use etalon::cpu::{CpuBackend, CpuOptions};
+use etalon::cpu::{Checks, CpuBackend, CpuOptions};
 use etalon::wgpu::{WgpuBackend, WgpuOptions, wgpu::Backends};
 use etalon_core::backend::{Backend, BackendError};
 
 use super::{Api, Job};
 use crate::test_backends::model::BackendKind;
 
+/// A backend, and the interpreter as what it is.
+pub(super) enum Opened {
+    Cpu(Box<CpuBackend>),
+    Device(Box<dyn Backend>),
+}
+
+impl Opened {
+    pub(super) fn backend(&mut self) -> &mut dyn Backend {
+        match self {
+            Self::Cpu(backend) => backend.as_mut(),
+            Self::Device(backend) => backend.as_mut(),
+        }
+    }
+
+    /// What checks found, a line each.
+    pub(super) fn findings(&self) -> Vec<String> {
+        let Self::Cpu(backend) = self else {
+            return Vec::new();
+        };
+        let found = backend.findings();
+        let mut lines: Vec<String> = found.list.iter().map(ToString::to_string).collect();
+        if found.omitted > 0 {
+            lines.push(format!("and {} more at other places", found.omitted));
+        }
+        lines
+    }
+}
+
 /// The backend of a job, on the device its environment leaves it.
 ///
 /// # Errors
 /// If there is no such device.
-pub(super) fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(match job.backend {
-        BackendKind::Cpu => Box::new(CpuBackend::new(&CpuOptions {
-            threads: job.threads,
-            ..CpuOptions::default()
-        })?),
+pub(super) fn open(job: &Job) -> Result<Opened, BackendError> {
+    let device: Box<dyn Backend> = match job.backend {
+        BackendKind::Cpu => {
+            return Ok(Opened::Cpu(Box::new(CpuBackend::new(&CpuOptions {
+                threads: job.threads,
+                checks: if job.checks {
+                    Checks::all()
+                } else {
+                    Checks::NONE
+                },
+                ..CpuOptions::default()
+            })?)));
+        }
         BackendKind::Wgpu => {
             let backends = match job.api {
                 Api::Vulkan => Backends::VULKAN,
@@ -39,5 +74,6 @@ pub(super) fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
                 ..AshOptions::default()
             })?)
         }
-    })
+    };
+    Ok(Opened::Device(device))
 }

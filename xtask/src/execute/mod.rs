@@ -95,6 +95,9 @@ pub struct Job {
     /// Whether ash runs under the validation layer, whose messages are errors.
     #[arg(long)]
     pub validate: bool,
+    /// Whether the interpreter watches for what a GPU hides.
+    #[arg(long)]
+    pub checks: bool,
     /// A fault to plant.
     #[arg(long)]
     pub plant: Option<Fault>,
@@ -145,6 +148,9 @@ impl Job {
         add("--out", (&self.out).into());
         if self.validate {
             arguments.push("--validate".into());
+        }
+        if self.checks {
+            arguments.push("--checks".into());
         }
         arguments
     }
@@ -244,7 +250,8 @@ pub fn run(job: &Job) -> Result<(), OutcomeError> {
 fn execute(job: &Job) -> Result<Run, ExecuteError> {
     let effect = find_effect(&job.effect)?;
     // The device first: without one there is no need to render anything.
-    let mut backend = open(job)?;
+    let mut opened = open(job)?;
+    let backend = opened.backend();
     let frame = job.source().frame()?;
     let graph = graph(&frame, effect)?;
     let mut kernels = KernelLibrary::new();
@@ -265,6 +272,7 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
         device: backend.info().into(),
         captures: Vec::new(),
         times: Vec::new(),
+        findings: Vec::new(),
     };
     for number in 0..job.frames {
         let mut execution = backend.execute(&plan, &frame.inputs())?;
@@ -307,5 +315,6 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
             )?);
         }
     }
+    run.findings = opened.findings();
     Ok(run)
 }

@@ -46,6 +46,9 @@ pub struct Run {
     pub captures: Vec<Capture>,
     /// Time of each step in the last frame.
     pub times: Vec<Time>,
+    /// What the interpreter's checks found, a line each.
+    #[serde(default)]
+    pub findings: Vec<String>,
 }
 
 /// Who ran a plan. As [`BackendInfo`], but readable from JSON.
@@ -248,6 +251,7 @@ mod tests {
                 step: "bloom/threshold".into(),
                 nanoseconds: 1234,
             }],
+            findings: vec!["pass: file:1:2: what".into()],
         };
         (run, image)
     }

@@ -147,6 +147,8 @@ pub enum Status {
         /// Time of each step in the last frame; empty where the device cannot
         /// tell.
         times: Vec<Time>,
+        /// What the interpreter's checks found, a line each.
+        findings: Vec<String>,
     },
     /// There is no device behind the driver.
     NoDevice {

@@ -91,6 +91,10 @@ pub struct Options {
     /// Run ash under the Khronos validation layer, its messages being failures
     #[arg(long)]
     pub validate: bool,
+    /// Have the interpreter watch for what a GPU hides: accesses out of bounds,
+    /// reads of what nothing wrote, races, NaNs that are born, and more
+    #[arg(long)]
+    pub checks: bool,
     /// First install Vulkan drivers and tools (Debian and its kin)
     #[arg(long)]
     pub setup: bool,
@@ -136,6 +140,7 @@ impl Options {
             frames: self.frames,
             threads: self.threads,
             validate: self.validate,
+            checks: self.checks,
             plant: planted.map(|(_, fault)| fault.clone()),
             out,
         }

@@ -47,6 +47,7 @@ pub(super) fn run(
                 Status::Ran {
                     device: run.device.clone(),
                     times: run.times.clone(),
+                    findings: run.findings.clone(),
                 },
                 Some(run),
             ),
@@ -155,6 +156,7 @@ mod tests {
             frames: 1,
             threads: 0,
             validate: true,
+            checks: true,
             plant: None,
             out,
         };
@@ -201,7 +203,7 @@ mod tests {
 
     #[test]
     fn the_driver_and_the_job_reach_the_process() {
-        let script = r#"while [ "$1" != --out ]; do all="$all $1"; shift; done; all="$all $3"
+        let script = r#"while [ "$1" != --out ]; do all="$all $1"; shift; done; all="$all $3 $4"
             printf '{"status": "no-device", "reason": "%s|%s|%s"}' "$all" "$VK_DRIVER_FILES" "$VK_ICD_FILENAMES" > "$2/outcome.json""#;
         let (status, run) = run_script(script, LONG);
         assert!(run.is_none());
@@ -211,7 +213,7 @@ mod tests {
         assert_eq!(
             reason,
             " execute --backend ash --api vulkan --scene wet-floor --size 4x2 --effect chain --arithmetic strict \
-             --frames 1 --threads 0 --validate|/icd/test.json|/icd/test.json"
+             --frames 1 --threads 0 --validate --checks|/icd/test.json|/icd/test.json"
         );
     }
 }

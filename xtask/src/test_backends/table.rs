@@ -140,6 +140,14 @@ fn passes(text: &mut String, report: &Report, case: &Case) {
     {
         let _ = writeln!(text, "  ✗ {}", failure(comparison));
     }
+    for executor in &report.executors {
+        let run = report.run(case, &executor.id);
+        if let Some(Status::Ran { findings, .. }) = run.map(|run| &run.status) {
+            for finding in findings {
+                let _ = writeln!(text, "  {} found {finding}", executor.id);
+            }
+        }
+    }
 }
 
 /// The largest of each figure over several comparisons: largest and mean

@@ -33,14 +33,21 @@ pub(super) fn clear_texel(value: ClearValue) -> Texel {
 
 impl Histories {
     /// Makes sure that every history of a plan exists in its shape, with its
-    /// first contents if it is new.
-    pub(super) fn acquire(&mut self, plan: &Plan, pool: &mut Pool) -> Result<(), RunError> {
+    /// first contents if it is new. If `watched`, what a frame is to write counts as
+    /// unwritten at its start.
+    pub(super) fn acquire(
+        &mut self,
+        plan: &Plan,
+        pool: &mut Pool,
+        watched: bool,
+    ) -> Result<(), RunError> {
         for planned in &plan.histories {
-            if self
-                .0
-                .get(&planned.name)
-                .is_some_and(|history| history.previous.desc() == planned.desc)
+            if let Some(history) = self.0.get_mut(&planned.name)
+                && history.previous.desc() == planned.desc
             {
+                if watched {
+                    history.current.forget()?;
+                }
                 continue;
             }
             if let Some(other) = self.0.remove(&planned.name) {
@@ -48,7 +55,10 @@ impl Histories {
             }
             let previous = pool.texture(planned.desc, true)?;
             previous.view().fill(clear_texel(planned.initial));
-            let current = pool.texture(planned.desc, true)?;
+            let mut current = pool.texture(planned.desc, true)?;
+            if watched {
+                current.forget()?;
+            }
             self.0
                 .insert(planned.name.clone(), History { previous, current });
         }

@@ -1,5 +1,6 @@
 //! Running plans.
 
+mod findings;
 mod histories;
 mod pool;
 mod resources;
@@ -14,13 +15,15 @@ use etalon_core::kernel::{Kernel, KernelId};
 use etalon_core::plan::Plan;
 use etalon_core::resource::Limits;
 
+pub use self::findings::{Findings, StepFinding};
 use self::histories::Histories;
 use self::pool::Pool;
 pub use self::wide::{WideCapture, WideExecution};
 use crate::error::RunError;
 use crate::exec::{Executor, Profile, Tier};
+use crate::finding::Checks;
 use crate::num::NumberType;
-use crate::program::Program;
+use crate::program::{Program, TranslateOptions};
 
 /// How plans are run on the CPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,6 +42,10 @@ pub struct CpuOptions {
     /// What kernels compute in. In other types than `f32`, what passes write has
     /// a wide plane: see [`CpuBackend::execute_wide`].
     pub number_type: NumberType,
+    /// What to watch for; what is found is in [`CpuBackend::findings`]. Looking for
+    /// reads that nothing wrote also means that no two textures or buffers of a
+    /// plan share memory.
+    pub checks: Checks,
 }
 
 impl Default for CpuOptions {
@@ -50,6 +57,7 @@ impl Default for CpuOptions {
             max_trips: Executor::DEFAULT_MAX_TRIPS,
             profile: false,
             number_type: NumberType::F32,
+            checks: Checks::NONE,
         }
     }
 }
@@ -62,6 +70,8 @@ pub struct CpuBackend {
     pool: Pool,
     histories: Histories,
     counters: Counters,
+    checks: Checks,
+    findings: Findings,
 }
 
 impl CpuBackend {
@@ -86,6 +96,8 @@ impl CpuBackend {
             pool: Pool::new(options.number_type.is_wide()),
             histories: Histories::default(),
             counters: Counters::default(),
+            checks: options.checks,
+            findings: Findings::default(),
         })
     }
 
@@ -106,6 +118,17 @@ impl CpuBackend {
             .into_iter()
             .map(|(_, program)| program.profile())
             .collect()
+    }
+
+    /// What was found so far.
+    #[must_use]
+    pub fn findings(&self) -> &Findings {
+        &self.findings
+    }
+
+    /// What was found so far, which is forgotten.
+    pub fn take_findings(&mut self) -> Findings {
+        std::mem::take(&mut self.findings)
     }
 
     /// The bytecode of a kernel, for reading; translated at most once.
@@ -145,9 +168,14 @@ impl CpuBackend {
     /// Translates a kernel unless that was done before.
     fn prepare(&mut self, step: &str, kernel: &Arc<Kernel>) -> Result<(), BackendError> {
         if let std::collections::hash_map::Entry::Vacant(entry) = self.programs.entry(kernel.id) {
-            let program = Program::translate(kernel).map_err(|error| BackendError::Kernel {
-                step: step.to_owned(),
-                error: Box::new(error),
+            let options = TranslateOptions {
+                checks: self.checks,
+            };
+            let program = Program::translate_with(kernel, &options).map_err(|error| {
+                BackendError::Kernel {
+                    step: step.to_owned(),
+                    error: Box::new(error),
+                }
             })?;
             entry.insert(program);
             self.counters.kernels += 1;

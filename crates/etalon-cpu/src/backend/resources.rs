@@ -51,12 +51,15 @@ fn describe(desc: &TextureDesc, bytes: usize) -> String {
 }
 
 impl Resources {
-    /// Gives every resource of the plan a place, and imports their contents.
+    /// Gives every resource of the plan a place, and imports their contents. If
+    /// `watched`, each has a place of its own and counts as unwritten until
+    /// something writes it.
     pub(super) fn acquire(
         &mut self,
         plan: &Plan,
         inputs: &Inputs<'_>,
         pool: &mut Pool,
+        watched: bool,
     ) -> Result<(), BackendError> {
         let mut slots = BTreeMap::new();
         for resource in &plan.resources {
@@ -70,7 +73,8 @@ impl Resources {
                     index: *index,
                     current: true,
                 }),
-                ResourceKind::Transient(place) => slots.get(&place.slot).copied(),
+                ResourceKind::Transient(place) if !watched => slots.get(&place.slot).copied(),
+                ResourceKind::Transient(_) => None,
                 ResourceKind::Import(_) | ResourceKind::Output(_) => None,
             };
             if let Some(location) = shared {
@@ -92,6 +96,11 @@ impl Resources {
                     let mut texture = pool
                         .texture(*desc, import.is_none())
                         .map_err(|error| out_of_memory(name, error))?;
+                    if watched {
+                        texture
+                            .forget()
+                            .map_err(|error| out_of_memory(name, error))?;
+                    }
                     if let Some(contents) = contents {
                         texture.write(contents);
                     }
@@ -105,6 +114,11 @@ impl Resources {
                     let mut buffer = pool
                         .buffer(desc.bytes, import.is_none())
                         .map_err(|error| out_of_memory(name, error))?;
+                    if watched {
+                        buffer
+                            .forget()
+                            .map_err(|error| out_of_memory(name, error))?;
+                    }
                     if let Some(contents) = contents {
                         buffer.write(contents);
                     }

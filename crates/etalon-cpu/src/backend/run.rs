@@ -43,9 +43,10 @@ impl CpuBackend {
         resources: &mut Resources,
         mut wide: Option<&mut Vec<WideCapture>>,
     ) -> Result<Execution, BackendError> {
-        resources.acquire(plan, inputs, &mut self.pool)?;
+        let watched = self.checks.uninitialised;
+        resources.acquire(plan, inputs, &mut self.pool, watched)?;
         self.histories
-            .acquire(plan, &mut self.pool)
+            .acquire(plan, &mut self.pool, watched)
             .map_err(|error| step_error("histories", error))?;
         let mut execution = Execution::default();
         for step in &plan.steps {
@@ -254,9 +255,10 @@ impl CpuBackend {
             bound.push(found.clone());
         }
         self.counters.dispatches += 1;
-        program
+        let report = program
             .dispatch(&self.executor, groups, &bound)
             .map_err(|error| step_error(name, error))?;
+        self.findings.add(name, report.findings);
         Ok(())
     }
 }

@@ -1,10 +1,11 @@
 //! Dispatching: workgroups over workers.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use rayon::prelude::*;
 
+use super::check::{Checker, Collector, Shadow};
 use super::link::Linked;
 use super::profile::{Recorder, Recording, Unwatched, Watch};
 use super::state::{Failure, LocalIds, Resource, State};
@@ -154,20 +155,10 @@ impl Executor {
 /// What a failed dispatch says; [`crate::Program`] adds the names.
 #[derive(Debug)]
 pub(crate) enum DispatchFailure {
-    Failed(Failure, u32),
+    /// In which workgroup, x first, and after how many trips of a loop.
+    Failed(Failure, u64, u32),
     TooManyWorkgroups,
     OutOfMemory(u64),
-}
-
-/// The workgroups of a dispatch, for workers to take from.
-struct Shares<'a> {
-    total: u64,
-    /// How many are taken at a time.
-    share: u64,
-    /// The first not taken yet.
-    next: &'a AtomicU64,
-    /// Whether a worker has failed.
-    stop: &'a AtomicBool,
 }
 
 /// A kernel ready to be dispatched.
@@ -177,13 +168,10 @@ pub(crate) struct Job<'a, N: Number> {
     pub(crate) resources: &'a [Resource<'a>],
     pub(crate) local_ids: &'a LocalIds,
     pub(crate) invocations: u32,
+    /// What is known of the resources' contents, for checks.
+    pub(crate) shadows: &'a [Shadow<'a>],
     /// Where to record what instructions cost, if that is wanted.
     pub(crate) recording: Option<&'a Mutex<Recording>>,
-}
-
-/// What a lock guards here is whole even if a holder of it panicked.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl<N: Number> Job<'_, N> {
@@ -191,17 +179,14 @@ impl<N: Number> Job<'_, N> {
         &self,
         executor: &Executor,
         workgroups: [u32; 3],
-    ) -> Result<DispatchCounters, DispatchFailure> {
+    ) -> Result<(DispatchCounters, Collector), DispatchFailure> {
         let total = workgroups
             .iter()
             .try_fold(1_u64, |total, &count| total.checked_mul(count.into()))
             .ok_or(DispatchFailure::TooManyWorkgroups)?;
         if total == 0 {
-            return Ok(DispatchCounters::default());
+            return Ok(Default::default());
         }
-        let next = AtomicU64::new(0);
-        let stop = AtomicBool::new(false);
-        let failure = Mutex::new(None::<DispatchFailure>);
         // Small enough shares that no worker is left alone with the rest, large
         // enough that neighbours share cache lines of what they read.
         let threads = if self.code.depends_on_order() {
@@ -209,26 +194,26 @@ impl<N: Number> Job<'_, N> {
         } else {
             executor.threads()
         };
-        let share = (total / (threads as u64 * 16)).clamp(1, 64);
+        let shared = Shared {
+            total,
+            share: (total / (threads as u64 * 16)).clamp(1, 64),
+            next: AtomicU64::new(0),
+            failed: AtomicU64::new(u64::MAX),
+            failure: Mutex::new(None),
+            found: Mutex::new(Collector::default()),
+        };
         let work = || {
-            let shares = Shares {
-                total,
-                share,
-                next: &next,
-                stop: &stop,
-            };
             let result = match self.recording {
-                None => self.work(executor, workgroups, &shares, &mut Unwatched),
+                None => self.work(executor, workgroups, &shared, &mut Unwatched),
                 Some(recording) => {
                     let mut recorder = Recorder::new(self.code);
-                    let result = self.work(executor, workgroups, &shares, &mut recorder);
+                    let result = self.work(executor, workgroups, &shared, &mut recorder);
                     lock(recording).add(recorder);
                     result
                 }
             };
-            if let Err(found) = result {
-                stop.store(true, Ordering::Relaxed);
-                lock(&failure).get_or_insert(found);
+            if let Err(failure) = result {
+                shared.fail(failure);
             }
         };
         if threads == 1 {
@@ -241,16 +226,15 @@ impl<N: Number> Job<'_, N> {
                     .for_each(|_| work())
             });
         }
-        let failure = match failure.into_inner() {
-            Ok(failure) => failure,
-            Err(poisoned) => poisoned.into_inner(),
-        };
-        match failure {
+        match into_inner(shared.failure) {
             Some(failure) => Err(failure),
-            None => Ok(DispatchCounters {
-                workgroups: total,
-                invocations: total.saturating_mul(self.invocations.into()),
-            }),
+            None => Ok((
+                DispatchCounters {
+                    workgroups: total,
+                    invocations: total.saturating_mul(self.invocations.into()),
+                },
+                into_inner(shared.found),
+            )),
         }
     }
 
@@ -259,15 +243,10 @@ impl<N: Number> Job<'_, N> {
         &self,
         executor: &Executor,
         workgroups: [u32; 3],
-        shares: &Shares<'_>,
+        shared: &Shared,
         watch: &mut impl Watch<N>,
     ) -> Result<(), DispatchFailure> {
-        let &Shares {
-            total,
-            share,
-            next,
-            stop,
-        } = shares;
+        let &Shared { total, share, .. } = shared;
         // A batch is a part of a workgroup, or several of them.
         let all_chunks = self.local_ids.active.len();
         let batch = executor.batch as usize / LANES;
@@ -282,8 +261,13 @@ impl<N: Number> Job<'_, N> {
         let mut state: Option<State<'_, N>> = None;
         let [x, y, _] = workgroups.map(u64::from);
         loop {
-            let first = next.fetch_add(share, Ordering::Relaxed);
-            if first >= total || stop.load(Ordering::Relaxed) {
+            let first = shared.next.fetch_add(share, Ordering::Relaxed);
+            // Workgroups before one that failed still run: which failure is
+            // reported must not depend on the workers' speed.
+            if first >= total.min(shared.failed.load(Ordering::Relaxed)) {
+                if let Some(checker) = state.and_then(|state| state.checker) {
+                    lock(&shared.found).append(checker.collector);
+                }
                 return Ok(());
             }
             let state = match &mut state {
@@ -303,6 +287,9 @@ impl<N: Number> Job<'_, N> {
                 state.workgroup_floats.fill(N::default());
                 state.workgroup_ints.fill(0);
                 let chunks = groups as usize * all_chunks;
+                if let Some(checker) = &mut state.checker {
+                    checker.begin(index);
+                }
                 let mut chunk = 0;
                 while chunk < chunks {
                     state.first_chunk = chunk;
@@ -310,7 +297,13 @@ impl<N: Number> Job<'_, N> {
                     chunk += state.chunks;
                     self.linked
                         .run(state, executor.max_trips, watch)
-                        .map_err(|failure| DispatchFailure::Failed(failure, executor.max_trips))?;
+                        .map_err(|failure| {
+                            let after = match failure {
+                                Failure::EndlessLoop { workgroup, .. } => workgroup.into(),
+                                Failure::DivergentBarrier { .. } => 0,
+                            };
+                            DispatchFailure::Failed(failure, index + after, executor.max_trips)
+                        })?;
                 }
                 index += groups;
             }
@@ -353,6 +346,7 @@ impl<N: Number> Job<'_, N> {
             subgroup_size: executor.subgroup_size,
             failure: None,
             trips: vec![0; self.code.loops.len()],
+            checker: Checker::new(self.code, chunks, self.shadows),
         };
         for &(slot, bits) in &self.code.constants {
             state.set_bits(slot, 0, &[bits]);
@@ -360,6 +354,46 @@ impl<N: Number> Job<'_, N> {
         self.linked.run_prologue(&mut state);
         Ok(state)
     }
+}
+
+/// What the workers of a dispatch have in common.
+struct Shared {
+    /// Workgroups.
+    total: u64,
+    /// How many a worker takes at a time.
+    share: u64,
+    /// First workgroup that nobody has taken.
+    next: AtomicU64,
+    /// The first workgroup that is known to have failed.
+    failed: AtomicU64,
+    failure: Mutex<Option<DispatchFailure>>,
+    found: Mutex<Collector>,
+}
+
+impl Shared {
+    /// Keeps the failure of the lowest workgroup; one without a workgroup comes first.
+    fn fail(&self, new: DispatchFailure) {
+        let workgroup = |failure: &DispatchFailure| match failure {
+            DispatchFailure::Failed(_, workgroup, _) => *workgroup,
+            _ => 0,
+        };
+        self.failed.fetch_min(workgroup(&new), Ordering::Relaxed);
+        let mut failure = lock(&self.failure);
+        if failure
+            .as_ref()
+            .is_none_or(|old| workgroup(&new) < workgroup(old))
+        {
+            *failure = Some(new);
+        }
+    }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn into_inner<T>(mutex: Mutex<T>) -> T {
+    mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn allocate<T: Clone + Default>(count: usize) -> Result<Vec<T>, DispatchFailure> {

@@ -5,7 +5,7 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{half, image, memory, sample, subgroup, texel_atomic};
+use super::{check, half, image, memory, sample, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::Op;
 use crate::num::Number;
@@ -138,13 +138,20 @@ impl<N: Number> Linked<N> {
                     state.trips[counter as usize] = 0;
                     head
                 }
-                End::Again { counter, head } => {
+                End::Again {
+                    counter,
+                    head,
+                    end,
+                    mask,
+                } => {
                     let trips = &mut state.trips[counter as usize];
                     *trips += 1;
                     if *trips >= max_trips {
-                        return Err(Failure::EndlessLoop(counter));
+                        check::endless(state, counter, mask, max_trips)?;
+                        end
+                    } else {
+                        head
                     }
-                    head
                 }
                 End::Stop => break,
             };
@@ -197,6 +204,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::ImageQuery { .. } => image::query(tier, varying_result),
         Op::Subgroup { .. } => Handler::plain::<subgroup::Subgroup>(),
         Op::Barrier => Handler::plain::<Barrier>(),
+        Op::Check(_) => Handler::plain::<check::CheckStep>(),
     }
 }
 
@@ -228,18 +236,12 @@ impl<N: Number> Step<N> for Barrier {
     #[inline(always)]
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         let inst = state.inst(instr.index);
-        for chunk in 0..state.chunks {
-            let active = state.local_ids.active[state.local_chunk(chunk)].0;
-            let mask = state.mask(inst, chunk);
-            if active
-                .iter()
-                .zip(&mask)
-                .any(|(active, mask)| active & !mask != 0)
-            {
-                state
-                    .failure
-                    .get_or_insert(Failure::DivergentBarrier(instr.index));
-            }
+        let missing = check::invocations(state, inst.mask, false);
+        if let Some((_, invocation)) = missing.into_iter().min() {
+            state.failure.get_or_insert(Failure::DivergentBarrier {
+                inst: instr.index,
+                invocation,
+            });
         }
     }
 }

@@ -9,6 +9,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod arith;
+mod check;
 mod dispatch;
 mod half;
 mod image;
@@ -33,6 +34,7 @@ pub use dispatch::{DispatchCounters, Executor};
 pub use profile::{Cost, Profile, ProfiledInstruction};
 pub use tier::Tier;
 
+pub(crate) use check::{Detail, Found, Part, Shadow, Site};
 pub(crate) use dispatch::{DispatchFailure, Job};
 pub(crate) use lanes::Operands;
 pub(crate) use link::Linked;

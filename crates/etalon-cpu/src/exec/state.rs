@@ -2,6 +2,7 @@
 
 use etalon_core::resource::SamplerDesc;
 
+use super::check::Checker;
 use crate::code::{Code, CodeInst, Slot};
 use crate::memory::{Buffer, TextureView};
 use crate::num::Number;
@@ -55,10 +56,15 @@ impl LocalIds {
 /// Why a worker stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Failure {
-    /// By the loop's number.
-    EndlessLoop(u32),
-    /// By the instruction's index.
-    DivergentBarrier(u32),
+    /// By the loop's number; the lowest workgroup of the batch, counted from its
+    /// first, and invocation that is in it.
+    EndlessLoop {
+        counter: u32,
+        workgroup: u32,
+        invocation: u32,
+    },
+    /// By the instruction's index; the lowest invocation that is missing.
+    DivergentBarrier { inst: u32, invocation: u32 },
 }
 
 /// A worker's state.
@@ -85,6 +91,8 @@ pub(crate) struct State<'a, N: Number> {
     pub(crate) failure: Option<Failure>,
     /// Trips of each loop since it was entered.
     pub(crate) trips: Vec<u32>,
+    /// Of programs with checks.
+    pub(crate) checker: Option<Box<Checker<'a>>>,
 }
 
 impl<'a, N: Number> State<'a, N> {

@@ -6,13 +6,17 @@
 //! carries data around loops and out of branches.
 
 pub(crate) mod arith;
+mod check;
 mod op;
 pub(crate) mod subgroup;
 
 pub(crate) use arith::{Arith, Class};
+pub(crate) use check::{Access, Check, Indexed};
 pub(crate) use op::{AtomicFunction, ImageAccess, ImageQuery, Input, Memory, Op, Sampling};
 
 use naga::Span;
+
+use crate::finding::Checks;
 
 /// A scalar that is computed once per execution of its instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -137,10 +141,12 @@ pub(crate) struct Resources {
     pub(crate) private: Slots,
     /// Memory of the workgroup: slots of each class.
     pub(crate) workgroup: Slots,
+    /// What the program watches for.
+    pub(crate) checks: Checks,
 }
 
 /// A number of memory slots of each class.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(crate) struct Slots {
     pub(crate) float: u32,
     pub(crate) int: u32,

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::subgroup::SubgroupFunction;
-use super::{Arith, Class};
+use super::{Arith, Check, Class};
 
 /// What a kernel is told about its place in the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -193,6 +193,8 @@ pub(crate) enum Op {
     },
     /// Fails unless every invocation is active.
     Barrier,
+    /// Looks for what a GPU hides.
+    Check(Check),
 }
 
 impl Op {
@@ -267,6 +269,7 @@ impl Op {
                 | Self::ImageAtomic { .. }
                 | Self::Subgroup { .. }
                 | Self::Barrier
+                | Self::Check(_)
         )
     }
 
@@ -376,6 +379,7 @@ impl fmt::Display for Op {
                 write!(f, "subgroup.{} {function:?}", class(c))
             }
             Self::Barrier => f.write_str("barrier"),
+            Self::Check(check) => check.fmt(f),
         }
     }
 }

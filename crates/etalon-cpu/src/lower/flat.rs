@@ -54,10 +54,13 @@ pub(crate) enum Terminator {
         counter: u32,
         head: BlockId,
     },
-    /// Around a loop.
+    /// Around a loop, or to its end if it has run too often. The mask is of the
+    /// lanes that are still in it.
     Again {
         counter: u32,
         head: BlockId,
+        end: BlockId,
+        mask: Option<Reg>,
     },
     End,
 }
@@ -65,10 +68,9 @@ pub(crate) enum Terminator {
 impl Terminator {
     pub(crate) fn successors(self) -> impl Iterator<Item = BlockId> {
         let (first, second) = match self {
-            Self::Jump(block)
-            | Self::Enter { head: block, .. }
-            | Self::Again { head: block, .. } => (Some(block), None),
+            Self::Jump(block) | Self::Enter { head: block, .. } => (Some(block), None),
             Self::Branch { yes, no, .. } | Self::Any { yes, no, .. } => (Some(yes), Some(no)),
+            Self::Again { head, end, .. } => (Some(head), Some(end)),
             Self::End => (None, None),
         };
         first.into_iter().chain(second)
@@ -77,6 +79,7 @@ impl Terminator {
     pub(crate) fn operand(self) -> Option<Reg> {
         match self {
             Self::Branch { condition: reg, .. } | Self::Any { mask: reg, .. } => Some(reg),
+            Self::Again { mask, .. } => mask,
             _ => None,
         }
     }
@@ -84,6 +87,7 @@ impl Terminator {
     pub(crate) fn operand_mut(&mut self) -> Option<&mut Reg> {
         match self {
             Self::Branch { condition: reg, .. } | Self::Any { mask: reg, .. } => Some(reg),
+            Self::Again { mask, .. } => mask.as_mut(),
             _ => None,
         }
     }

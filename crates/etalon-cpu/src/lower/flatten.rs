@@ -142,12 +142,14 @@ impl Flattener<'_> {
             |label: &mut BlockId| *label = targets.get(label.0 as usize).copied().unwrap_or(*label);
         for block in &mut self.flat.blocks {
             match &mut block.end {
-                Terminator::Jump(to)
-                | Terminator::Enter { head: to, .. }
-                | Terminator::Again { head: to, .. } => resolve(to),
-                Terminator::Branch { yes, no, .. } | Terminator::Any { yes, no, .. } => {
-                    resolve(yes);
-                    resolve(no);
+                Terminator::Jump(to) | Terminator::Enter { head: to, .. } => resolve(to),
+                Terminator::Branch { yes: a, no: b, .. }
+                | Terminator::Any { yes: a, no: b, .. }
+                | Terminator::Again {
+                    head: a, end: b, ..
+                } => {
+                    resolve(a);
+                    resolve(b);
                 }
                 Terminator::End => {}
             }
@@ -620,6 +622,8 @@ impl Flattener<'_> {
         self.close(Terminator::Again {
             counter,
             head: to(head),
+            end: to(end),
+            mask: in_loop,
         });
         self.mask = outer;
         self.start(end);

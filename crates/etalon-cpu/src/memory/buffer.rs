@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use super::wide::WideWords;
+use super::written;
 use crate::error::RunError;
 
 /// Bytes a kernel reads and writes, as 32-bit words.
@@ -11,6 +12,8 @@ pub struct Buffer {
     words: Vec<AtomicU32>,
     bytes: u64,
     wide: Option<WideWords>,
+    /// Which words something wrote, if that is of interest.
+    shadow: Option<Vec<AtomicU32>>,
 }
 
 impl Buffer {
@@ -33,6 +36,7 @@ impl Buffer {
             words,
             bytes,
             wide: None,
+            shadow: None,
         })
     }
 
@@ -97,6 +101,32 @@ impl Buffer {
         self.bytes.saturating_add(wide)
     }
 
+    /// A buffer that holds nothing yet: its words are zero, and reading one before
+    /// it is written is reported by programs that look for that
+    /// ([`crate::Checks::uninitialised`]).
+    ///
+    /// # Errors
+    /// [`RunError::OutOfMemory`] if there is no memory for it.
+    pub fn unwritten(bytes: u64) -> Result<Self, RunError> {
+        let mut buffer = Self::zeroed(bytes)?;
+        buffer.forget()?;
+        Ok(buffer)
+    }
+
+    /// From here on the buffer counts as unwritten, whatever it holds.
+    pub(crate) fn forget(&mut self) -> Result<(), RunError> {
+        match &self.shadow {
+            Some(shadow) => written::forget(shadow),
+            None => self.shadow = Some(written::unwritten(self.words.len(), "a buffer")?),
+        }
+        Ok(())
+    }
+
+    /// What is known of which words are written.
+    pub(crate) fn shadow(&self) -> Option<&[AtomicU32]> {
+        self.shadow.as_deref()
+    }
+
     /// A buffer of the given bytes.
     ///
     /// # Errors
@@ -127,6 +157,9 @@ impl Buffer {
             *word.get_mut() = u32::from_le_bytes(value);
         }
         self.forget_wide();
+        if let Some(shadow) = &self.shadow {
+            written::write(&shadow[..bytes.len().div_ceil(4).min(shadow.len())]);
+        }
     }
 
     /// Sets every byte to zero.
@@ -135,6 +168,9 @@ impl Buffer {
             word.store(0, Ordering::Relaxed);
         }
         self.forget_wide();
+        if let Some(shadow) = &self.shadow {
+            written::write(shadow);
+        }
     }
 
     /// Copies as many bytes of another buffer as both have.
@@ -145,6 +181,11 @@ impl Buffer {
         match (&self.wide, &source.wide) {
             (Some(wide), Some(source)) => wide.copy_from(source),
             _ => self.forget_wide(),
+        }
+        if let Some(shadow) = &self.shadow {
+            for (i, word) in shadow.iter().enumerate().take(source.words.len()) {
+                written::copy(word, source.shadow.as_ref().and_then(|from| from.get(i)));
+            }
         }
     }
 

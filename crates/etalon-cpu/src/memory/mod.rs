@@ -7,6 +7,7 @@ mod buffer;
 mod texel;
 mod texture;
 mod wide;
+pub(crate) mod written;
 
 pub use buffer::Buffer;
 pub use texture::{Texture, TextureView};

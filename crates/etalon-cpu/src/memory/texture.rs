@@ -9,6 +9,7 @@ use etalon_core::resource::{Dimension, Extent, TextureDesc};
 use etalon_core::texel::Texel;
 
 use super::wide::{WideTexels, can_be_wide, in_range, widened};
+use super::written;
 use crate::error::RunError;
 
 /// Texels of all mips and layers, in the order of [`ImageData`].
@@ -40,6 +41,8 @@ pub struct Texture {
     pub(crate) levels: Vec<Level>,
     pub(crate) texels: Texels,
     wide: Option<WideTexels>,
+    /// Which texels something wrote, if that is of interest.
+    shadow: Option<Texels>,
 }
 
 macro_rules! each {
@@ -117,6 +120,7 @@ impl Texture {
             levels,
             texels,
             wide: None,
+            shadow: None,
         })
     }
 
@@ -168,6 +172,36 @@ impl Texture {
         }
     }
 
+    /// A texture that holds nothing yet: its texels are zero, and reading one
+    /// before it is written is reported by programs that look for that
+    /// ([`crate::Checks::uninitialised`]).
+    ///
+    /// # Errors
+    /// As [`Texture::zeroed`].
+    pub fn unwritten(desc: TextureDesc) -> Result<Self, RunError> {
+        let mut texture = Self::zeroed(desc)?;
+        texture.forget()?;
+        Ok(texture)
+    }
+
+    /// From here on the texture counts as unwritten, whatever it holds.
+    pub(crate) fn forget(&mut self) -> Result<(), RunError> {
+        match self.shadow() {
+            Some(shadow) => written::forget(shadow),
+            None => {
+                let count = self.bytes() / u64::from(self.desc.format.texel_bytes());
+                // As many as there are, so the number fits.
+                let shadow = written::unwritten(count as usize, "a texture")?;
+                self.shadow = Some(Texels::B4(shadow));
+            }
+        }
+        Ok(())
+    }
+
+    fn shadow(&self) -> Option<&[AtomicU32]> {
+        shadow_words(self.shadow.as_ref()?)
+    }
+
     /// A texture with an image's texels.
     ///
     /// # Errors
@@ -199,6 +233,7 @@ impl Texture {
             levels: self.levels.clone(),
             texels: &self.texels,
             wide: self.wide.as_ref(),
+            shadow: self.shadow.as_ref(),
         }
     }
 
@@ -223,6 +258,7 @@ impl Texture {
             levels,
             texels: &self.texels,
             wide: self.wide.as_ref(),
+            shadow: self.shadow.as_ref(),
         })
     }
 
@@ -234,6 +270,10 @@ impl Texture {
             }
         });
         self.refresh_wide();
+        if let Some(shadow) = self.shadow() {
+            let texels = bytes.len() / self.desc.format.texel_bytes() as usize;
+            written::write(&shadow[..texels.min(shadow.len())]);
+        }
     }
 
     /// A copy of the texels.
@@ -280,6 +320,37 @@ pub struct TextureView<'a> {
     pub(crate) levels: Vec<Level>,
     pub(crate) texels: &'a Texels,
     pub(crate) wide: Option<&'a WideTexels>,
+    shadow: Option<&'a Texels>,
+}
+
+/// The words of a texture's shadow.
+fn shadow_words(shadow: &Texels) -> Option<&[AtomicU32]> {
+    match shadow {
+        Texels::B4(words) => Some(words),
+        _ => None,
+    }
+}
+
+impl<'a> TextureView<'a> {
+    /// What is known of which texels of the whole texture are written; indices are
+    /// those of [`Level`].
+    pub(crate) fn shadow(&self) -> Option<&'a [AtomicU32]> {
+        shadow_words(self.shadow?)
+    }
+
+    /// A texture of the same shape whose texels are above 0 where nothing wrote.
+    pub(crate) fn shadow_view(&self) -> Option<Self> {
+        Some(Self {
+            desc: TextureDesc {
+                format: etalon_core::Format::R32Float,
+                ..self.desc
+            },
+            levels: self.levels.clone(),
+            texels: self.shadow?,
+            wide: None,
+            shadow: None,
+        })
+    }
 }
 
 impl TextureView<'_> {
@@ -296,11 +367,15 @@ impl TextureView<'_> {
         } else {
             1
         };
-        self.levels.iter().map(move |level| {
-            let start = level.start as usize * words;
-            start
-                ..start
-                    + level.width as usize * level.height as usize * level.depth as usize * words
+        self.texel_runs()
+            .map(move |run| run.start * words..run.end * words)
+    }
+
+    /// The texels of each mip, which are consecutive: first and one past the last.
+    fn texel_runs(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
+        self.levels.iter().map(|level| {
+            let start = level.start as usize;
+            start..start + level.width as usize * level.height as usize * level.depth as usize
         })
     }
 
@@ -371,6 +446,15 @@ impl TextureView<'_> {
         Ok(Some(texels))
     }
 
+    /// Notes that all texels of the part are written.
+    pub(crate) fn note_written(&self) {
+        if let Some(shadow) = self.shadow() {
+            for run in self.texel_runs() {
+                written::write(&shadow[run]);
+            }
+        }
+    }
+
     /// A copy of the texels.
     ///
     /// # Errors
@@ -412,6 +496,7 @@ impl TextureView<'_> {
                 wide.set(index, value);
             }
         }
+        self.note_written();
     }
 
     /// Copies all texels of a part of equal shape; says whether it is one.
@@ -448,6 +533,14 @@ impl TextureView<'_> {
             for (to, from) in self.indices().flatten().zip(source.indices().flatten()) {
                 if let Some(value) = source.wide_texel(from) {
                     wide.set(to, value);
+                }
+            }
+        }
+        if let Some(shadow) = self.shadow() {
+            let from = source.shadow();
+            for (to, at) in self.texel_runs().zip(source.texel_runs()) {
+                for (word, i) in shadow[to].iter().zip(at) {
+                    written::copy(word, from.and_then(|from| from.get(i)));
                 }
             }
         }

@@ -16,7 +16,14 @@ impl<'a> Translator<'a> {
         frame: &mut Frame<'a>,
         expression: Handle<Expression>,
     ) -> Result<(), Fail> {
-        let span = frame.function.expressions.get_span(expression);
+        let mut span = frame.function.expressions.get_span(expression);
+        if !span.is_defined()
+            && let Expression::Load { pointer } = frame.function.expressions[expression]
+            && let Expression::LocalVariable(local) = frame.function.expressions[pointer]
+        {
+            // Where a whole local variable is read is not kept; where it is declared is.
+            span = frame.function.local_variables.get_span(local);
+        }
         let outer = std::mem::replace(&mut self.builder.span, span);
         let operand = self.evaluate(frame, expression)?;
         self.builder.span = outer;
@@ -152,14 +159,16 @@ impl<'a> Translator<'a> {
                 Operand::Resource(_) => return Err(Fail::unsupported("arrays of textures")),
             },
             Expression::Access { base, index } => {
+                let signed = self.kind(frame, index)? == ScalarKind::Sint;
                 let index = self.scalar(frame, index)?;
                 match self.operand(frame, base)? {
                     Operand::Place(place) => {
+                        self.check_place_index(&place, index, signed)?;
                         return Ok(Operand::Place(self.element_at(&place, index)?));
                     }
                     Operand::Scalars(values) => {
                         let ty = self.ty(frame, base).clone();
-                        self.index_value(&ty, &values, index)?
+                        self.index_value(&ty, &values, index, signed)?
                     }
                     Operand::Resource(_) => return Err(Fail::unsupported("arrays of textures")),
                 }
@@ -263,6 +272,7 @@ impl<'a> Translator<'a> {
                 return Err(Fail::unsupported("cooperative matrices"));
             }
         };
+        self.check_finite(frame, expression, &values)?;
         Ok(Operand::Scalars(values))
     }
 
@@ -369,12 +379,15 @@ impl<'a> Translator<'a> {
         ty: &TypeInner,
         values: &[Value],
         index: Value,
+        signed: bool,
     ) -> Result<Vec<Value>, Fail> {
         let width = self.element_leaves(ty)?;
         if width == 0 || values.is_empty() {
             return Err(Fail::invalid("a value without elements is indexed"));
         }
         let count = values.len() / width;
+        let length = self.builder.int(count as u32);
+        self.check_index(ty, index, length, signed);
         let last = self.builder.int(count as u32 - 1);
         let index = self.builder.arith(Arith::MinU, &[index, last]);
         if let Some(index) = self.builder.constant_bits(index) {
@@ -476,9 +489,11 @@ impl<'a> Translator<'a> {
         }
         let width = a.len().max(b.len());
         let at = |values: &[Value], i: usize| values[if values.len() == 1 { 0 } else { i }];
+        let pairs: Vec<(Value, Value)> = (0..width).map(|i| (at(&a, i), at(&b, i))).collect();
+        self.check_integers(op, kind, &pairs);
         let mut result = Vec::with_capacity(width);
-        for i in 0..width {
-            result.push(self.binary_scalar(op, kind, at(&a, i), at(&b, i))?);
+        for (a, b) in pairs {
+            result.push(self.binary_scalar(op, kind, a, b)?);
         }
         Ok(result)
     }
@@ -628,6 +643,9 @@ impl<'a> Translator<'a> {
                 )));
             }
         };
+        if convert.is_some() {
+            self.check_conversion(&values, from, to);
+        }
         Ok(values
             .into_iter()
             .map(|value| {

@@ -4,7 +4,7 @@ use naga::{Expression, Handle, ImageClass, SampleLevel, ScalarKind, TypeInner};
 
 use super::{Fail, Frame, Translator};
 use crate::binding::{BindingKind, ChannelKind, MULTISAMPLED, View};
-use crate::ir::{Arith, Class, ImageAccess, ImageQuery, Op, Sampling, Value};
+use crate::ir::{Access, Arith, Class, ImageAccess, ImageQuery, Op, Sampling, Value};
 
 impl<'a> Translator<'a> {
     fn access(&self, image: u16, sampled: bool) -> Result<ImageAccess, Fail> {
@@ -111,6 +111,8 @@ impl<'a> Translator<'a> {
         if let Some(level) = level {
             operands.push(self.scalar(frame, level)?);
         }
+        let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
+        self.check_texel(access, level.is_some(), signed, Access::Read, &operands);
         let mut values = self.builder.op(
             Op::ImageLoad {
                 access,
@@ -136,6 +138,8 @@ impl<'a> Translator<'a> {
         let access = self.access(image, false)?;
         let class = self.channel_class(image);
         let mut operands = self.coordinates(frame, access, coordinate, layer)?;
+        let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
+        self.check_texel(access, false, signed, Access::Write, &operands);
         operands.extend(self.scalars(frame, value)?);
         self.builder
             .op(Op::ImageStore { access, class }, &operands, &[]);
@@ -241,6 +245,9 @@ impl<'a> Translator<'a> {
                 ));
             }
         }
+        if depth_ref.is_none() && !gradient && !clamp_to_edge && offset == [0; 3] {
+            self.check_sample(access, sampler, &operands);
+        }
         let mut values = self.builder.op(
             Op::ImageSample {
                 access,
@@ -319,6 +326,7 @@ impl<'a> Translator<'a> {
                     Some(level) => self.scalar(frame, level)?,
                     None => self.builder.int(0),
                 };
+                self.check_level(image, level);
                 (0..axes)
                     .map(|axis| {
                         self.builder.op(

@@ -2,6 +2,7 @@
 //! apart, pointers resolved.
 
 mod builder;
+mod check;
 mod expression;
 mod image;
 mod layout;
@@ -24,6 +25,7 @@ use self::layout::class_of;
 use self::place::Place;
 use crate::binding::{BindingInfo, describe_binding};
 use crate::ir::{Input, Op, ScopeId, Tree, Value, Variable};
+use crate::program::TranslateOptions;
 
 /// What went wrong; the place is the translator's current span.
 #[derive(Debug)]
@@ -101,6 +103,7 @@ pub(crate) fn translate(
     module: &Module,
     info: &ModuleInfo,
     entry_point: usize,
+    options: &TranslateOptions,
 ) -> Result<Translation, (Fail, Span)> {
     let mut translator = Translator {
         module,
@@ -114,7 +117,10 @@ pub(crate) fn translate(
         private_variables: Vec::new(),
         workgroup_size: module.entry_points[entry_point].workgroup_size,
     };
-    translator.builder.tree.independent = !scan::is_collective(module, info, entry_point);
+    // Checks know one workgroup at a time.
+    translator.builder.tree.independent =
+        !options.checks.any() && !scan::is_collective(module, info, entry_point);
+    translator.builder.tree.resources.checks = options.checks;
     match translator.entry_point(entry_point) {
         Ok(()) => Ok(Translation {
             bindings: translator.bindings,
@@ -175,13 +181,17 @@ impl<'a> Translator<'a> {
         let indexed = self.indexed.locals(function);
         for (handle, local) in function.local_variables.iter() {
             self.builder.span = function.local_variables.get_span(handle);
-            let place =
-                self.private_place(self.inner(local.ty).clone(), indexed.contains(&handle))?;
+            let ty = self.inner(local.ty);
+            let watched = self.is_watched(ty, local.init.is_some());
+            let place = self.private_place(ty.clone(), watched || indexed.contains(&handle))?;
             let initial = match local.init {
                 Some(init) => self.scalars(&mut frame, init)?,
                 None => self.zero(self.inner(local.ty))?,
             };
             self.store(&place, &initial)?;
+            if watched {
+                self.forget_place(&place)?;
+            }
             frame.locals.insert(handle, place);
         }
         Ok(frame)
@@ -210,13 +220,17 @@ impl<'a> Translator<'a> {
                 }
                 AddressSpace::WorkGroup => Operand::Place(self.workgroup_place(ty.clone())?),
                 AddressSpace::Private => {
-                    let place =
-                        self.private_place(ty.clone(), self.indexed.globals.contains(&handle))?;
+                    let watched = self.is_watched(ty, global.init.is_some());
+                    let indexed = self.indexed.globals.contains(&handle);
+                    let place = self.private_place(ty.clone(), watched || indexed)?;
                     let initial = match global.init {
                         Some(init) => self.global_constant(init)?,
                         None => self.zero(ty)?,
                     };
                     self.store(&place, &initial)?;
+                    if watched {
+                        self.forget_place(&place)?;
+                    }
                     self.private_variables.extend(place.variables());
                     Operand::Place(place)
                 }

@@ -6,7 +6,7 @@ use naga::TypeInner;
 
 use super::layout::{bytes, column_stride, fixed_length};
 use super::{Fail, Translator};
-use crate::ir::{Arith, AtomicFunction, Class, Memory, Op, Slots, Value, Variable};
+use crate::ir::{Access, Arith, AtomicFunction, Class, Memory, Op, Slots, Value, Variable};
 
 /// Most memory slots of a class per invocation or workgroup.
 const MAX_SLOTS: u32 = 1 << 14;
@@ -14,12 +14,13 @@ const MAX_SLOTS: u32 = 1 << 14;
 /// What a pointer points at.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
-    ty: TypeInner,
-    root: Root,
+    pub(super) ty: TypeInner,
+    pub(super) root: Root,
 }
 
+/// Where a pointee is.
 #[derive(Clone, Debug)]
-enum Root {
+pub(super) enum Root {
     /// Registers: the scalars of the whole variable, and where the pointee starts.
     Variables { all: Rc<[Variable]>, start: usize },
     /// Slots of each class; the computed parts are of each class, too.
@@ -61,7 +62,7 @@ impl Place {
     }
 }
 
-impl Translator<'_> {
+impl<'a> Translator<'a> {
     /// Room for a variable of one invocation.
     pub(super) fn private_place(&mut self, ty: TypeInner, indexed: bool) -> Result<Place, Fail> {
         if indexed {
@@ -230,7 +231,7 @@ impl Translator<'_> {
     }
 
     /// The number of elements, `None` for runtime-sized arrays.
-    fn length_of(&self, ty: &TypeInner) -> Result<Option<u32>, Fail> {
+    pub(super) fn length_of(&self, ty: &TypeInner) -> Result<Option<u32>, Fail> {
         Ok(match *ty {
             TypeInner::Vector { size, .. } => Some(size as u32),
             TypeInner::Matrix { columns, .. } => Some(columns as u32),
@@ -302,6 +303,7 @@ impl Translator<'_> {
     }
 
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Value>, Fail> {
+        self.check_memory(place, Access::Read)?;
         let leaves = self.leaves(&place.ty)?;
         let mut slots = Slots::default();
         let mut values = Vec::with_capacity(leaves.len());
@@ -377,6 +379,7 @@ impl Translator<'_> {
         if leaves.len() != values.len() {
             return Err(Fail::invalid("a stored value is not of the pointer's type"));
         }
+        self.check_memory(place, Access::Write)?;
         let mut slots = Slots::default();
         for (i, (leaf, &value)) in leaves.into_iter().zip(values).enumerate() {
             let class = leaf.class();
@@ -458,6 +461,7 @@ impl Translator<'_> {
                 "atomic operations on floating-point numbers",
             ));
         }
+        self.check_memory(place, Access::Atomic { reads: true })?;
         let (op, index) = match &place.root {
             &Root::Buffer {
                 buffer,

@@ -184,6 +184,9 @@ impl<'a> Translator<'a> {
                 let place = self.place(frame, *pointer)?;
                 let values = self.scalars(frame, *value)?;
                 self.store(&place, &values)?;
+                if self.is_declaration(frame, *pointer, *value) {
+                    self.forget_place(&place)?;
+                }
             }
             Statement::ImageStore {
                 image,
@@ -193,14 +196,14 @@ impl<'a> Translator<'a> {
             } => self.image_store(frame, *image, *coordinate, *array_index, *value)?,
             // Lanes of a subgroup are in step as all others.
             Statement::ControlBarrier(naga::Barrier::SUB_GROUP) => {}
-            Statement::ControlBarrier(_) => self.builder.barrier(),
+            Statement::ControlBarrier(barrier) => self.barrier(*barrier),
             // Lanes run in lockstep, so memory is always up to date.
             Statement::MemoryBarrier(_) => {}
             Statement::WorkGroupUniformLoad { pointer, result } => {
-                self.builder.barrier();
+                self.barrier(naga::Barrier::WORK_GROUP);
                 let place = self.place(frame, *pointer)?;
                 let values = self.load(&place)?;
-                self.builder.barrier();
+                self.barrier(naga::Barrier::WORK_GROUP);
                 frame.operands.insert(*result, Operand::Scalars(values));
             }
             Statement::Atomic {
@@ -244,6 +247,26 @@ impl<'a> Translator<'a> {
             }
         }
         Ok(true)
+    }
+
+    /// Whether a store only gives the zero value to a watched variable that is
+    /// declared in a loop without an initial one. It spans the declaration then, as
+    /// the value does; one that is written in the source is a part of its statement.
+    fn is_declaration(
+        &self,
+        frame: &Frame<'a>,
+        pointer: Handle<Expression>,
+        value: Handle<Expression>,
+    ) -> bool {
+        let expressions = &frame.function.expressions;
+        let (&Expression::LocalVariable(local), &Expression::ZeroValue(ty)) =
+            (&expressions[pointer], &expressions[value])
+        else {
+            return false;
+        };
+        let local = &frame.function.local_variables[local];
+        self.is_watched(self.inner(ty), local.init.is_some())
+            && expressions.get_span(value) == self.builder.span
     }
 
     /// Leaves a scope; says whether what follows is where that leads.

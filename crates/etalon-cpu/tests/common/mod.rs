@@ -1,13 +1,23 @@
 //! Running WGSL on the interpreter in tests.
 #![allow(dead_code)]
 
+pub(crate) mod checks;
+
 use etalon_core::Format;
 use etalon_core::image::ImageData;
 use etalon_core::resource::TextureDesc;
-use etalon_cpu::{BoundResource, Buffer, Executor, Program, Texture, Tier, TranslateError};
+use etalon_cpu::{
+    BoundResource, Buffer, Checks, Executor, Program, Texture, Tier, TranslateError,
+    TranslateOptions,
+};
 
 /// Parses, validates and translates; the entry point is `main`.
 pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
+    translate_with(wgsl, Checks::NONE)
+}
+
+/// [`translate`] with checks.
+pub(crate) fn translate_with(wgsl: &str, checks: Checks) -> Result<Program, TranslateError> {
     let module = naga::front::wgsl::parse_str(wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
     let info = naga::valid::Validator::new(
@@ -18,7 +28,8 @@ pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
     .subgroup_operations(naga::valid::SubgroupOperationSet::all())
     .validate(&module)
     .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
-    Program::from_module("test", wgsl, &module, &info, "main")
+    let options = TranslateOptions { checks };
+    Program::from_module_with("test", wgsl, &module, &info, "main", &options)
 }
 
 pub(crate) fn program(wgsl: &str) -> Program {

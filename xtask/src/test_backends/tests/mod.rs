@@ -112,6 +112,7 @@ impl Fixture {
                 device,
                 captures,
                 times,
+                findings: Vec::new(),
             },
         }
     }
@@ -120,6 +121,7 @@ impl Fixture {
         Status::Ran {
             device: self.run.device.clone(),
             times: self.run.times.clone(),
+            findings: self.run.findings.clone(),
         }
     }
 }

@@ -56,6 +56,19 @@ fn the_table_has_times_figures_and_the_failing_pass() {
     assert!(!text.contains("NOT OK") && !text.contains('✗'), "{text}");
 }
 
+/// Findings are shown with the executor they are of, and are no failure.
+#[test]
+fn the_table_has_what_checks_found() {
+    let (mut watched, other) = (Fixture::new(&images()), Fixture::new(&images()));
+    watched.run.findings = vec!["ssr/march: a.wesl:1:2: index 3 is outside of 2".into()];
+    let report = report_of(&[Some(&watched), Some(&other), Some(&other)], None);
+    let text = table::render(&report);
+    let id = &report.executors[0].id;
+    let line = format!("  {id} found ssr/march: a.wesl:1:2: index 3 is outside of 2\n");
+    assert_eq!(text.matches(" found ").count(), 1, "{text}");
+    assert!(text.contains(&line) && report.ok, "{text}");
+}
+
 #[test]
 fn the_json_has_every_comparison() {
     let json = serde_json::to_value(failing(None)).unwrap();

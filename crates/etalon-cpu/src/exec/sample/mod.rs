@@ -17,7 +17,7 @@ use etalon_core::resource::{Compare, Filter, SamplerDesc};
 use self::axis::AxisTexels;
 use self::lod::Lod;
 use super::image::{texture, wanted};
-use super::isa::Isa;
+use super::isa::{Isa, Portable};
 use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
@@ -43,6 +43,33 @@ pub(super) fn gather<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     } else {
         Handler::tiered::<gather::Gather<1>>(Tier::Baseline)
     }
+}
+
+/// The first channel of one sample.
+pub(super) fn one(
+    texture: &TextureView<'_>,
+    sampler: SamplerDesc,
+    access: ImageAccess,
+    at: [f32; 3],
+    layer: u32,
+    lod: f32,
+) -> f32 {
+    let request = Request {
+        texture,
+        sampler,
+        wanted: [true, false, false, false],
+        axes: usize::from(access.coordinates),
+        layered: access.layered,
+        cube: access.cube,
+        offset: [0; 3],
+        compare: None,
+    };
+    let place = Place {
+        at: at.map(|axis| [axis]),
+        layer: [layer],
+        reference: [0.0],
+    };
+    request.sample::<Portable, 1>(&place, &Lod::Same(lod))[0][0]
 }
 
 struct Sample<const K: usize>;

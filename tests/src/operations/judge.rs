@@ -200,3 +200,180 @@ pub fn judge(
     }
     judgement
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::operations::float::FloatType;
+    use crate::operations::kernel::result_words;
+    use crate::operations::table;
+
+    fn operation(name: &str) -> Operation {
+        table::all()
+            .into_iter()
+            .find(|operation| operation.name == name)
+            .unwrap_or_else(|| panic!("no operation `{name}`"))
+    }
+
+    /// What an executor gives that computes what the semantics say.
+    fn right(operation: &Operation, expected: &[Vec<Expectation>]) -> Vec<u32> {
+        let scalars: Vec<_> = operation.output_scalars().collect();
+        let mut results = vec![0; result_words(operation)];
+        for form in 0..operation.forms().len() {
+            for (case, expected) in expected.iter().enumerate() {
+                for (index, expected) in expected.iter().enumerate() {
+                    let exact = || {
+                        let ty = scalars[index].float().unwrap_or(FloatType::F32);
+                        let inside = match &expected.allowed {
+                            Allowed::Numbers(all) => all.first().map_or(0.0, |one| one.low),
+                            _ => 0.0,
+                        };
+                        let value = expected.exact.unwrap_or(inside);
+                        ty.encode(ty.nearest(crate::operations::exact::Exact::new(value)))
+                    };
+                    results[position(operation, form, index, case)] =
+                        expected.bits.unwrap_or_else(exact);
+                }
+            }
+        }
+        results
+    }
+
+    /// The first case that `wanted` is true of.
+    fn case(expected: &[Vec<Expectation>], wanted: impl Fn(&Expectation) -> bool) -> usize {
+        expected
+            .iter()
+            .position(|expected| wanted(&expected[0]))
+            .unwrap_or_else(|| panic!("no such case"))
+    }
+
+    /// The only failure.
+    fn failure(judgement: &Judgement) -> &Failure {
+        match &judgement.failures[..] {
+            [failure] => failure,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn right_results_pass() {
+        for name in ["a + b, f32", "a / b, f32", "frexp(a), f32", "a % b, i32", "unpack4x8snorm(a)"] {
+            let operation = operation(name);
+            let expected = expectations(&operation);
+            let results = right(&operation, &expected);
+            for who in [Who::Interpreter, Who::Strict(&results), Who::Fast] {
+                let judgement = judge(&operation, &expected, &results, who);
+                assert_eq!(judgement.failures, [], "{name}, {who:?}");
+                assert!(judgement.judged > 0 && judgement.judged <= judgement.results);
+            }
+        }
+    }
+
+    #[test]
+    fn one_ulp_is_caught_where_the_result_is_rounded() {
+        let operation = operation("a / b, f32");
+        let expected = expectations(&operation);
+        let interpreter = right(&operation, &expected);
+        let at = case(&expected, |expected| expected.exact.is_some() && expected.flushed.len() == 1);
+        let mut results = interpreter.clone();
+        results[at] += 1;
+        let judgement = judge(&operation, &expected, &results, Who::Interpreter);
+        let failed = failure(&judgement);
+        assert_eq!((failed.check, failed.count), (Check::Bits, 1));
+        // The message has inputs, result and what it should have been.
+        let inputs = operation.show_case(&operation.cases[at]);
+        assert!(failed.first.contains(&inputs), "{}", failed.first);
+        assert!(failed.first.contains(&format!("{:#010x}", results[at])), "{}", failed.first);
+        assert!(failed.first.contains(&format!("{:#010x}", interpreter[at])), "{}", failed.first);
+        let judgement = judge(&operation, &expected, &results, Who::Strict(&interpreter));
+        assert_eq!(failure(&judgement).check, Check::Bits);
+        // WGSL gives a quotient 2.5 ULP, and a sum none beyond its neighbours.
+        let judgement = judge(&operation, &expected, &results, Who::Fast);
+        assert_eq!(judgement.failures, []);
+        let sum = super::tests::operation("a + b, f32");
+        let expected = expectations(&sum);
+        let mut results = right(&sum, &expected);
+        let at = case(&expected, |expected| {
+            let exact = |exact: f64| exact == f64::from(exact as f32);
+            expected.exact.is_some_and(exact)
+        });
+        results[at] += 1;
+        let judgement = judge(&sum, &expected, &results, Who::Fast);
+        assert_eq!(failure(&judgement).check, Check::Accuracy);
+    }
+
+    #[test]
+    fn values_outside_the_interval_are_caught_in_both_forms() {
+        let operation = operation("exp(a), f32");
+        let expected = expectations(&operation);
+        let results = right(&operation, &expected);
+        let at = case(&expected, |expected| {
+            expected.exact.is_some_and(|exact| exact > 1.5 && exact < 2.0)
+        });
+        for form in 0..2 {
+            let mut results = results.clone();
+            // 3 + 2 · |x| ULP is less than 5 here.
+            results[position(&operation, form, 0, at)] += 5;
+            let judgement = judge(&operation, &expected, &results, Who::Fast);
+            let failed = failure(&judgement);
+            assert_eq!(failed.check, Check::Accuracy);
+            assert!(failed.first.contains(operation.forms()[form]), "{}", failed.first);
+            assert!(judgement.worst.is_some_and(|worst| worst > 4.0));
+            // Inside WGSL's interval, but not where the interpreter has to be.
+            results[position(&operation, form, 0, at)] -= 3;
+            let judgement = judge(&operation, &expected, &results, Who::Interpreter);
+            assert_eq!(failure(&judgement).check, Check::OwnAccuracy);
+            assert_eq!(judge(&operation, &expected, &results, Who::Fast).failures, []);
+        }
+    }
+
+    #[test]
+    fn flushing_is_for_drivers_only_and_zeros_have_signs() {
+        let operation = operation("a * b, f32");
+        let expected = expectations(&operation);
+        let interpreter = right(&operation, &expected);
+        let subnormal = |word: u32| word & 0x7f80_0000 == 0 && word & 0x7f_ffff != 0;
+        let at = case(&expected, |expected| expected.bits.is_some_and(subnormal));
+        let mut results = interpreter.clone();
+        results[at] = 0;
+        let judgement = judge(&operation, &expected, &results, Who::Interpreter);
+        assert_eq!(failure(&judgement).check, Check::Bits);
+        let judgement = judge(&operation, &expected, &results, Who::Strict(&interpreter));
+        assert_eq!(judgement.failures, []);
+        let at = case(&expected, |expected| {
+            expected.bits == Some(0) && !expected.special && expected.flushed == [0]
+        });
+        let mut results = interpreter.clone();
+        results[at] = 0x8000_0000;
+        let judgement = judge(&operation, &expected, &results, Who::Strict(&interpreter));
+        assert_eq!(failure(&judgement).check, Check::ZeroSign);
+        assert_eq!(judge(&operation, &expected, &results, Who::Fast).failures, []);
+    }
+
+    #[test]
+    fn nan_is_only_held_to_strict_arithmetic() {
+        let operation = operation("a + b, f32");
+        let expected = expectations(&operation);
+        let interpreter = right(&operation, &expected);
+        let is_nan = |word: u32| f32::from_bits(word).is_nan();
+        let at = case(&expected, |expected| expected.bits.is_some_and(is_nan));
+        let mut results = interpreter.clone();
+        // Another NaN is as good.
+        results[at] = 0xffc0_1234;
+        let judgement = judge(&operation, &expected, &results, Who::Strict(&interpreter));
+        assert_eq!(judgement.failures, []);
+        results[at] = 0;
+        let judgement = judge(&operation, &expected, &results, Who::Strict(&interpreter));
+        assert_eq!(failure(&judgement).check, Check::Special);
+        assert_eq!(judge(&operation, &expected, &results, Who::Fast).failures, []);
+    }
+
+    #[test]
+    fn missing_results_are_failures() {
+        let operation = operation("!a, bool");
+        let expected = expectations(&operation);
+        let judgement = judge(&operation, &expected, &[], Who::Fast);
+        assert_eq!(failure(&judgement).check, Check::Run);
+        assert_eq!(judgement.judged, 0);
+    }
+}

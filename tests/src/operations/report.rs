@@ -222,3 +222,97 @@ fn align(rows: &[Vec<String>]) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::exceptions::parse;
+    use super::super::judge::{Check, Failure};
+    use super::*;
+
+    fn entry(operation: &str, executor: &str, failed: Option<Check>) -> Entry {
+        let failures = failed.map(|check| Failure {
+            check,
+            count: 3,
+            first: "of 0x1 (1): 0x2 (2), not 0x3 (3) (scalar)".to_owned(),
+        });
+        Entry {
+            operation: operation.to_owned(),
+            executor: executor.to_owned(),
+            arithmetic: "strict",
+            judgement: Judgement {
+                results: 10,
+                judged: 8,
+                worst: Some(0.5),
+                failures: failures.into_iter().collect(),
+            },
+        }
+    }
+
+    fn report(entries: Vec<Entry>) -> Report {
+        let mut executors: Vec<String> = Vec::new();
+        for entry in &entries {
+            if !executors.contains(&entry.executor) {
+                executors.push(entry.executor.clone());
+            }
+        }
+        Report {
+            executors,
+            entries,
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn unlisted_failures_are_problems_that_say_everything() {
+        let mut report = report(vec![
+            entry("a + b, f32", "cpu", None),
+            entry("a + b, f32", "ash/lavapipe", Some(Check::Bits)),
+        ]);
+        report.conclude(&[]);
+        assert!(!report.ok());
+        assert_eq!(
+            report.problems,
+            ["a + b, f32 on ash/lavapipe, strict arithmetic, bits: 3 results, \
+              the first of 0x1 (1): 0x2 (2), not 0x3 (3) (scalar)"]
+        );
+        let table = report.table(&[]);
+        assert!(table.contains("0.50 ✗  FAIL") && table.contains("NOT OK"), "{table}");
+    }
+
+    #[test]
+    fn listed_failures_are_excused_and_only_those() {
+        let exceptions = parse("a + b, f32; bits; lavapipe; it rounds down").unwrap();
+        let mut listed = report(vec![
+            entry("a + b, f32", "ash/lavapipe", Some(Check::Bits)),
+            entry("a + b, f32", "wgpu/lavapipe", Some(Check::Bits)),
+        ]);
+        listed.conclude(&exceptions);
+        assert!(listed.ok(), "{:?}", listed.problems);
+        assert!(listed.excused[0].ends_with("it rounds down"), "{:?}", listed.excused);
+        let table = listed.table(&exceptions);
+        assert!(table.contains("0.50 (✗)  exception") && table.contains("\nOK:"), "{table}");
+        let mut other = report(vec![entry("a + b, f32", "ash/lavapipe", Some(Check::Accuracy))]);
+        other.conclude(&exceptions);
+        assert_eq!(other.problems.len(), 2, "the failure, and the exception that is stale");
+    }
+
+    #[test]
+    fn exceptions_that_no_longer_occur_are_stale_where_the_driver_is_there() {
+        let exceptions = parse("a + b, f32; bits; lavapipe; once").unwrap();
+        let mut fixed = report(vec![entry("a + b, f32", "wgpu/lavapipe", None)]);
+        fixed.conclude(&exceptions);
+        assert_eq!(
+            fixed.problems,
+            ["stale exception, exceptions.txt:1: a + b, f32 no longer fails `bits` on wgpu/lavapipe"]
+        );
+        // Neither without the driver, nor without the operation.
+        for elsewhere in [
+            entry("a + b, f32", "ash/swiftshader", None),
+            entry("a - b, f32", "ash/lavapipe", None),
+        ] {
+            let mut report = report(vec![elsewhere]);
+            report.conclude(&exceptions);
+            assert!(report.ok(), "{:?}", report.problems);
+        }
+    }
+}

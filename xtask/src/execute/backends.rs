@@ -5,21 +5,28 @@ use etalon::cpu::{CpuBackend, CpuOptions};
 use etalon::wgpu::{WgpuBackend, WgpuOptions, wgpu::Backends};
 use etalon_core::backend::{Backend, BackendError};
 
-use super::{Api, Job};
+use super::Api;
 use crate::test_backends::model::BackendKind;
 
-/// The backend of a job, on the device its environment leaves it.
+/// A backend on the device that the environment leaves it: `threads` are those
+/// of the interpreter, 0 for as many as there are processors; with `validate`,
+/// messages of the validation layer are errors of ash.
 ///
 /// # Errors
 /// If there is no such device.
-pub(super) fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
-    Ok(match job.backend {
+pub(crate) fn open(
+    backend: BackendKind,
+    api: Api,
+    threads: usize,
+    validate: bool,
+) -> Result<Box<dyn Backend>, BackendError> {
+    Ok(match backend {
         BackendKind::Cpu => Box::new(CpuBackend::new(&CpuOptions {
-            threads: job.threads,
+            threads,
             ..CpuOptions::default()
         })?),
         BackendKind::Wgpu => {
-            let backends = match job.api {
+            let backends = match api {
                 Api::Vulkan => Backends::VULKAN,
                 Api::Gl => Backends::GL,
             };
@@ -29,7 +36,7 @@ pub(super) fn open(job: &Job) -> Result<Box<dyn Backend>, BackendError> {
             })?)
         }
         BackendKind::Ash => {
-            let validation = if job.validate {
+            let validation = if validate {
                 Validation::Synchronization
             } else {
                 Validation::Off

@@ -2,7 +2,7 @@
 //! process of its own: the Vulkan loader reads its environment once per
 //! process, and a driver that crashes must not take the comparison with it.
 
-mod backends;
+pub(crate) mod backends;
 mod buffer;
 pub mod frame;
 pub mod outcome;
@@ -244,7 +244,7 @@ pub fn run(job: &Job) -> Result<(), OutcomeError> {
 fn execute(job: &Job) -> Result<Run, ExecuteError> {
     let effect = find_effect(&job.effect)?;
     // The device first: without one there is no need to render anything.
-    let mut backend = open(job)?;
+    let mut backend = open(job.backend, job.api, job.threads, job.validate)?;
     let frame = job.source().frame()?;
     let graph = graph(&frame, effect)?;
     let mut kernels = KernelLibrary::new();

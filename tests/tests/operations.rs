@@ -13,7 +13,10 @@ fn every_operation_is_as_wgsl_and_strict_arithmetic_have_it() {
     let operations = table::all();
     let kernels = library(&operations);
     let mut executors = executors();
-    let names: Vec<String> = executors.iter().map(|executor| executor_name(&executor.info())).collect();
+    let names: Vec<String> = executors
+        .iter()
+        .map(|executor| executor_name(&executor.info()))
+        .collect();
     let mut report = Report {
         executors: names.clone(),
         ..Report::default()

@@ -97,10 +97,7 @@ impl Table {
     #[must_use]
     pub fn ulps(self, low: Exact, high: Exact, ulps: f64) -> Interval {
         let (low, high) = (enclose(low).0, enclose(high).1);
-        self.settle(
-            low - ulps * self.0.ulp(low),
-            high + ulps * self.0.ulp(high),
-        )
+        self.settle(low - ulps * self.0.ulp(low), high + ulps * self.0.ulp(high))
     }
 
     /// The table's absolute errors.
@@ -492,7 +489,9 @@ mod tests {
         // The f32 nearest to π lies above it.
         assert!(F32.cos(point(std::f32::consts::PI)).is_any());
         let sine = F32.sin(point(1.0));
-        assert!(sine.contains(1.0_f64.sin() + 0.000_48) && !sine.contains(1.0_f64.sin() + 0.000_49));
+        assert!(
+            sine.contains(1.0_f64.sin() + 0.000_48) && !sine.contains(1.0_f64.sin() + 0.000_49)
+        );
     }
 
     #[test]
@@ -502,6 +501,9 @@ mod tests {
         // (1e8 + 1) - 1e8 is 0 or 8; (1e8 - 1e8) + 1 is 1.
         assert!(sum.contains(0.0) && sum.contains(1.0) && sum.contains(8.0));
         assert!(!sum.contains(9.0) && !sum.contains(-1.0));
-        assert_eq!(Reals.sum(&terms.map(|term| Exact::new(term.low))).head(), 1.0);
+        assert_eq!(
+            Reals.sum(&terms.map(|term| Exact::new(term.low))).head(),
+            1.0
+        );
     }
 }

@@ -91,7 +91,9 @@ pub fn parse(table: &str) -> Result<Vec<Exception>, BadLine> {
         }
         let Some(check) = Check::ALL.into_iter().find(|known| known.name() == check) else {
             let names = Check::ALL.map(Check::name).join(", ");
-            return Err(bad(format!("there is no check `{check}`; there are {names}")));
+            return Err(bad(format!(
+                "there is no check `{check}`; there are {names}"
+            )));
         };
         if executor == "cpu" {
             return Err(bad("the interpreter has no exceptions".to_owned()));
@@ -123,7 +125,9 @@ mod tests {
         let operations = super::super::table::all();
         for exception in known().unwrap_or_else(|error| panic!("{error}")) {
             assert!(
-                operations.iter().any(|operation| operation.name == exception.operation),
+                operations
+                    .iter()
+                    .any(|operation| operation.name == exception.operation),
                 "line {}: there is no operation `{}`",
                 exception.line,
                 exception.operation

@@ -206,7 +206,9 @@ mod tests {
     fn rounding_to_f32_is_that_of_the_processor() {
         let mut state = 1_u64;
         for _ in 0..200_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
             // All exponents of f32 and some beyond, many values near the middle.
             let exponent = (state >> 20) % 330 + 1023 - 170;
             let mut fraction = state >> 12;
@@ -234,11 +236,17 @@ mod tests {
         let just_above = |x: f64| Exact::new(x) + Exact::new(power_of_two(-200));
         assert_eq!(f32.below(just_below(1.0)), f64::from(1.0_f32.next_down()));
         assert_eq!(f32.above(just_below(1.0)), 1.0);
-        assert_eq!(f32.below(just_below(-1.0)), f64::from((-1.0_f32).next_down()));
+        assert_eq!(
+            f32.below(just_below(-1.0)),
+            f64::from((-1.0_f32).next_down())
+        );
         assert_eq!(f32.above(just_above(1.0)), f64::from(1.0_f32.next_up()));
         let middle = 1.0 + power_of_two(-24);
         assert_eq!(f32.nearest(Exact::new(middle)), 1.0);
-        assert_eq!(f32.nearest(just_above(middle)), f64::from(1.0_f32.next_up()));
+        assert_eq!(
+            f32.nearest(just_above(middle)),
+            f64::from(1.0_f32.next_up())
+        );
         assert_eq!(f32.nearest(just_below(middle)), 1.0);
     }
 

@@ -153,18 +153,10 @@ pub fn reflect<A: Arithmetic>(a: &A, x: &[A::Value], y: &[A::Value]) -> Vec<A::V
 /// `z * x - (z * dot(y, x) + sqrt(k)) * y`, where
 /// `k = 1.0 - z * z * (1.0 - dot(y, x) * dot(y, x))`; "if `k < 0.0` the result
 /// is precisely 0.0".
-pub fn refract<A: Arithmetic>(
-    a: &A,
-    x: &[A::Value],
-    y: &[A::Value],
-    z: A::Value,
-) -> Vec<A::Value> {
+pub fn refract<A: Arithmetic>(a: &A, x: &[A::Value], y: &[A::Value], z: A::Value) -> Vec<A::Value> {
     let (zero, one) = (a.constant(0.0), a.constant(1.0));
     let along = dot(a, y, x);
-    let k = a.sub(
-        one,
-        a.mul(a.mul(z, z), a.sub(one, a.mul(along, along))),
-    );
+    let k = a.sub(one, a.mul(a.mul(z, z), a.sub(one, a.mul(along, along))));
     let factor = a.add(a.mul(z, along), a.sqrt(k));
     x.iter()
         .zip(y)

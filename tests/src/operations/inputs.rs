@@ -14,7 +14,7 @@ impl Random {
     }
 
     /// 64 random bits.
-    pub fn next(&mut self) -> u64 {
+    pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -24,17 +24,17 @@ impl Random {
 
     /// 32 random bits.
     pub fn word(&mut self) -> u32 {
-        (self.next() >> 32) as u32
+        (self.bits() >> 32) as u32
     }
 
     /// In [0, 1).
     pub fn unit(&mut self) -> f64 {
-        (self.next() >> 11) as f64 * power_of_two(-53)
+        (self.bits() >> 11) as f64 * power_of_two(-53)
     }
 
     /// One of several.
     pub fn pick(&mut self, values: &[u32]) -> u32 {
-        values[(self.next() % values.len().max(1) as u64) as usize]
+        values[(self.bits() % values.len().max(1) as u64) as usize]
     }
 }
 
@@ -110,7 +110,10 @@ pub fn special(ty: FloatType) -> Vec<u32> {
 
 fn both_signs(ty: FloatType, positive: Vec<u32>) -> Vec<u32> {
     let sign = ty.encode(-0.0);
-    let mut all: Vec<u32> = positive.iter().flat_map(|&word| [word, word | sign]).collect();
+    let mut all: Vec<u32> = positive
+        .iter()
+        .flat_map(|&word| [word, word | sign])
+        .collect();
     all.sort_unstable();
     all.dedup();
     all
@@ -139,8 +142,8 @@ pub fn any(ty: FloatType, random: &mut Random) -> u32 {
 
 /// A number whose magnitude lies within 2^±8.
 pub fn ordinary(ty: FloatType, random: &mut Random) -> u32 {
-    let magnitude = power_of_two((random.next() % 16) as i32 - 8) * (1.0 + random.unit());
-    let sign = if random.next() & 1 == 0 { 1.0 } else { -1.0 };
+    let magnitude = power_of_two((random.bits() % 16) as i32 - 8) * (1.0 + random.unit());
+    let sign = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
     ty.encode(ty.below(super::exact::Exact::new(sign * magnitude)))
 }
 
@@ -187,7 +190,7 @@ pub fn several(ty: FloatType, count: usize, seed: u64) -> Vec<Vec<u32>> {
         // Within some ULP of each other, of either sign.
         let first = ordinary(ty, &mut random);
         let near = |random: &mut Random| {
-            let sign = if random.next() & 1 == 0 { 0 } else { sign };
+            let sign = if random.bits() & 1 == 0 { 0 } else { sign };
             (first ^ sign).wrapping_add(random.word() % 16)
         };
         all.push((0..count).map(|_| near(&mut random)).collect());
@@ -204,7 +207,7 @@ pub fn mostly_ordinary(ty: FloatType, count: usize, seed: u64) -> Vec<Vec<u32>> 
         .map(|index| {
             let mut case: Vec<u32> = (0..count).map(|_| ordinary(ty, &mut random)).collect();
             if index % 8 == 0 {
-                let place = (random.next() % count.max(1) as u64) as usize;
+                let place = (random.bits() % count.max(1) as u64) as usize;
                 case[place] = random.pick(&special);
             }
             case
@@ -242,7 +245,18 @@ pub fn integer_cases(count: usize, seed: u64) -> Vec<Vec<u32>> {
     };
     if count > 1 {
         // What division and shifts have as hard cases, not left to chance.
-        let hard = [0, 1, 2, 31, 32, 33, 0x7fff_ffff, 0x8000_0000, 0x8000_0001, u32::MAX];
+        let hard = [
+            0,
+            1,
+            2,
+            31,
+            32,
+            33,
+            0x7fff_ffff,
+            0x8000_0000,
+            0x8000_0001,
+            u32::MAX,
+        ];
         for &first in &hard {
             for &second in &hard {
                 let mut case = vec![first, second];
@@ -256,7 +270,7 @@ pub fn integer_cases(count: usize, seed: u64) -> Vec<Vec<u32>> {
         // Each of a random length.
         all.push(
             (0..count)
-                .map(|_| random.word() >> (random.next() % 32))
+                .map(|_| random.word() >> (random.bits() % 32))
                 .collect(),
         );
     }

@@ -93,8 +93,16 @@ pub(crate) fn extremes(values: &[Exact]) -> Option<(Exact, Exact)> {
     all.try_fold((first, first), |(low, high), value| {
         value.is_finite().then(|| {
             (
-                if (value - low).signum() < 0.0 { value } else { low },
-                if (value - high).signum() > 0.0 { value } else { high },
+                if (value - low).signum() < 0.0 {
+                    value
+                } else {
+                    low
+                },
+                if (value - high).signum() > 0.0 {
+                    value
+                } else {
+                    high
+                },
             )
         })
     })
@@ -118,7 +126,10 @@ mod tests {
     #[test]
     fn extremes_need_finite_numbers() {
         let of = |x| Exact::new(x);
-        assert_eq!(extremes(&[of(2.0), of(-1.0), of(0.5)]), Some((of(-1.0), of(2.0))));
+        assert_eq!(
+            extremes(&[of(2.0), of(-1.0), of(0.5)]),
+            Some((of(-1.0), of(2.0)))
+        );
         assert_eq!(extremes(&[of(1.0), of(f64::NAN)]), None);
         assert_eq!(extremes(&[of(f64::INFINITY), of(1.0)]), None);
     }

@@ -307,25 +307,34 @@ fn flush(scalar: Scalar, word: u32) -> u32 {
     }
 }
 
+/// What words mean to a result.
+type WordsOf = dyn Fn(&[u32]) -> Words + Send + Sync;
+/// What the table makes of numbers.
+type TableOf = dyn Fn(Table, &[f64]) -> Vec<Interval> + Send + Sync;
+/// What real arithmetic makes of numbers.
+type ExactOf = dyn Fn(&[Exact]) -> Exact + Send + Sync;
+/// What IEEE 754 makes of numbers.
+type IeeeOf = dyn Fn(&[f32]) -> f32 + Send + Sync;
+
 /// What a result means.
 pub(crate) enum Meaning {
     /// A floating-point result.
     Float(Float),
     /// A result that is exactly one word, or one of several.
-    Words(Box<dyn Fn(&[u32]) -> Words + Send + Sync>),
+    Words(Box<WordsOf>),
 }
 
 /// A floating-point result of floating-point parameters.
 pub(crate) struct Float {
     pub(crate) ty: FloatType,
     /// What the table allows for finite parameters: one of these intervals.
-    pub(crate) table: Box<dyn Fn(Table, &[f64]) -> Vec<Interval> + Send + Sync>,
+    pub(crate) table: Box<TableOf>,
     /// The exact value for finite parameters.
-    pub(crate) exact: Box<dyn Fn(&[Exact]) -> Exact + Send + Sync>,
+    pub(crate) exact: Box<ExactOf>,
     /// IEEE 754's result where it is not the exact one rounded: zeros, infinity
     /// and NaN. `None` where the interpreter's semantics promise no more than
     /// the table.
-    pub(crate) ieee: Option<Box<dyn Fn(&[f32]) -> f32 + Send + Sync>>,
+    pub(crate) ieee: Option<Box<IeeeOf>>,
 }
 
 /// What a result that is no number may be.
@@ -472,7 +481,7 @@ fn expect_words(
     scalar: Scalar,
     scalars: &[Scalar],
     alternatives: &[Vec<u32>],
-    words: &(dyn Fn(&[u32]) -> Words + Send + Sync),
+    words: &WordsOf,
 ) -> Expectation {
     let all: Vec<Words> = alternatives.iter().map(|case| words(case)).collect();
     let mut allowed = Some(Vec::new());

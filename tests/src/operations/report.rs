@@ -62,7 +62,11 @@ impl Report {
             }
         }
         for exception in exceptions {
-            for executor in self.executors.iter().filter(|name| exception.is_about(name)) {
+            for executor in self
+                .executors
+                .iter()
+                .filter(|name| exception.is_about(name))
+            {
                 let mut ran = self
                     .entries
                     .iter()
@@ -73,7 +77,9 @@ impl Report {
                 let was_run = ran.peek().is_some();
                 let occurs = ran.any(|entry| {
                     let failures = &entry.judgement.failures;
-                    failures.iter().any(|failure| failure.check == exception.check)
+                    failures
+                        .iter()
+                        .any(|failure| failure.check == exception.check)
                 });
                 if was_run && !occurs {
                     self.problems.push(format!(
@@ -108,8 +114,14 @@ impl Report {
         let _ = writeln!(
             text,
             "\n{} results judged of {}; errors in ULP of the exact value.",
-            self.entries.iter().map(|entry| entry.judgement.judged).sum::<usize>(),
-            self.entries.iter().map(|entry| entry.judgement.results).sum::<usize>(),
+            self.entries
+                .iter()
+                .map(|entry| entry.judgement.judged)
+                .sum::<usize>(),
+            self.entries
+                .iter()
+                .map(|entry| entry.judgement.results)
+                .sum::<usize>(),
         );
         if !self.excused.is_empty() {
             let _ = writeln!(text, "\nExceptions");
@@ -272,11 +284,16 @@ mod tests {
         assert!(!report.ok());
         assert_eq!(
             report.problems,
-            ["a + b, f32 on ash/lavapipe, strict arithmetic, bits: 3 results, \
-              the first of 0x1 (1): 0x2 (2), not 0x3 (3) (scalar)"]
+            [
+                "a + b, f32 on ash/lavapipe, strict arithmetic, bits: 3 results, \
+              the first of 0x1 (1): 0x2 (2), not 0x3 (3) (scalar)"
+            ]
         );
         let table = report.table(&[]);
-        assert!(table.contains("0.50 ✗  FAIL") && table.contains("NOT OK"), "{table}");
+        assert!(
+            table.contains("0.50 ✗  FAIL") && table.contains("NOT OK"),
+            "{table}"
+        );
     }
 
     #[test]
@@ -288,12 +305,27 @@ mod tests {
         ]);
         listed.conclude(&exceptions);
         assert!(listed.ok(), "{:?}", listed.problems);
-        assert!(listed.excused[0].ends_with("it rounds down"), "{:?}", listed.excused);
+        assert!(
+            listed.excused[0].ends_with("it rounds down"),
+            "{:?}",
+            listed.excused
+        );
         let table = listed.table(&exceptions);
-        assert!(table.contains("0.50 (✗)  exception") && table.contains("\nOK:"), "{table}");
-        let mut other = report(vec![entry("a + b, f32", "ash/lavapipe", Some(Check::Accuracy))]);
+        assert!(
+            table.contains("0.50 (✗)  exception") && table.contains("\nOK:"),
+            "{table}"
+        );
+        let mut other = report(vec![entry(
+            "a + b, f32",
+            "ash/lavapipe",
+            Some(Check::Accuracy),
+        )]);
         other.conclude(&exceptions);
-        assert_eq!(other.problems.len(), 2, "the failure, and the exception that is stale");
+        assert_eq!(
+            other.problems.len(),
+            2,
+            "the failure, and the exception that is stale"
+        );
     }
 
     #[test]
@@ -303,7 +335,9 @@ mod tests {
         fixed.conclude(&exceptions);
         assert_eq!(
             fixed.problems,
-            ["stale exception, exceptions.txt:1: a + b, f32 no longer fails `bits` on wgpu/lavapipe"]
+            [
+                "stale exception, exceptions.txt:1: a + b, f32 no longer fails `bits` on wgpu/lavapipe"
+            ]
         );
         // Neither without the driver, nor without the operation.
         for elsewhere in [

@@ -95,7 +95,12 @@ pub fn run(
     let execution = executor
         .execute(&plan, &Inputs::new().buffer("data", &data))
         .map_err(RunError::Backend)?;
-    match execution.captures.into_iter().next().map(|captured| captured.data) {
+    match execution
+        .captures
+        .into_iter()
+        .next()
+        .map(|captured| captured.data)
+    {
         Some(CapturedData::Buffer(bytes)) if bytes.len() == 4 * words => Ok(bytes
             .chunks_exact(4)
             .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))

@@ -261,10 +261,7 @@ fn check_planted(options: &Options, executors: &[Executor]) -> Result<(), TestEr
 
 /// Everyone who is to run: the interpreter, then each driver asked for by wgpu
 /// and by ash, then OpenGL.
-pub(crate) fn executors(
-    drivers: &[Driver],
-    asked: &[String],
-) -> Result<Vec<Executor>, TestError> {
+pub(crate) fn executors(drivers: &[Driver], asked: &[String]) -> Result<Vec<Executor>, TestError> {
     const GL: &str = "gl";
     let is_known = |name: &str| {
         name == "all" || name == GL || drivers.iter().any(|driver| driver.name == name)

@@ -46,7 +46,11 @@ impl Job {
     #[must_use]
     pub fn arguments(&self) -> Vec<OsString> {
         let name = |value: Option<clap::builder::PossibleValue>| {
-            OsString::from(value.map(|value| value.get_name().to_owned()).unwrap_or_default())
+            OsString::from(
+                value
+                    .map(|value| value.get_name().to_owned())
+                    .unwrap_or_default(),
+            )
         };
         let mut arguments: Vec<OsString> = vec![
             "--backend".into(),
@@ -69,7 +73,7 @@ impl Job {
 /// How a job ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "kebab-case")]
-pub enum Outcome {
+pub(super) enum Outcome {
     /// Every operation was tried.
     Ran {
         /// The executor, as exceptions call it.
@@ -91,13 +95,13 @@ pub enum Outcome {
 
 /// How one operation went in one arithmetic.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OperationRun {
+pub(super) struct OperationRun {
     /// The operation's name.
-    pub operation: String,
+    pub(super) operation: String,
     /// Whether arithmetic was strict.
-    pub strict: bool,
+    pub(super) strict: bool,
     /// The file with the words of the results, or why there is none.
-    pub results: Result<String, String>,
+    pub(super) results: Result<String, String>,
 }
 
 /// Why results cannot be written or read.
@@ -136,7 +140,7 @@ impl Outcome {
     ///
     /// # Errors
     /// If there is nothing, or it is broken.
-    pub fn read(folder: &Path) -> Result<Self, ResultsError> {
+    pub(super) fn read(folder: &Path) -> Result<Self, ResultsError> {
         let path = folder.join(FILE);
         let text = std::fs::read_to_string(&path).map_err(|source| ResultsError::Io {
             path: path.clone(),
@@ -151,7 +155,7 @@ impl OperationRun {
     ///
     /// # Errors
     /// Why there are none.
-    pub fn read(&self, folder: &Path) -> Result<Vec<u32>, String> {
+    pub(super) fn read(&self, folder: &Path) -> Result<Vec<u32>, String> {
         let file = self.results.as_ref().map_err(Clone::clone)?;
         let bytes = std::fs::read(folder.join(file)).map_err(|error| format!("{file}: {error}"))?;
         let words = bytes
@@ -163,7 +167,7 @@ impl OperationRun {
 
 /// The operations whose names contain a text.
 #[must_use]
-pub fn chosen(text: Option<&str>) -> Vec<Operation> {
+pub(super) fn chosen(text: Option<&str>) -> Vec<Operation> {
     let mut operations = table::all();
     operations.retain(|operation| text.is_none_or(|text| operation.name.contains(text)));
     operations
@@ -180,7 +184,8 @@ pub fn execute(job: &Job) -> Result<(), ResultsError> {
             let kernels = library(&operations);
             let mut runs = Vec::new();
             for (index, operation) in operations.iter().enumerate() {
-                for (strict, arithmetic) in [(true, Arithmetic::Strict), (false, Arithmetic::Fast)] {
+                for (strict, arithmetic) in [(true, Arithmetic::Strict), (false, Arithmetic::Fast)]
+                {
                     if strict && !operation.strict {
                         continue;
                     }

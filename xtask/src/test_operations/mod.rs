@@ -186,8 +186,13 @@ impl Bench {
             limit,
             &log,
         );
-        let outcome = ended.and_then(|()| Outcome::read(&folder).map_err(|error| error.to_string()));
-        let mut problem = |text: String| self.report.problems.push(format!("{}: {text}", executor.id));
+        let outcome =
+            ended.and_then(|()| Outcome::read(&folder).map_err(|error| error.to_string()));
+        let mut problem = |text: String| {
+            self.report
+                .problems
+                .push(format!("{}: {text}", executor.id))
+        };
         match outcome {
             Ok(Outcome::Ran { name, runs }) => {
                 self.report.executors.push(name.clone());

@@ -6,6 +6,9 @@ use super::{componentwise, whole, word};
 
 use Scalar::{Bool, I32, U32};
 
+/// What is computed from two words.
+type Two = fn(u32, u32) -> u32;
+
 /// Adds all of them.
 pub(super) fn add(all: &mut Vec<Operation>) {
     logic(all);
@@ -16,7 +19,7 @@ pub(super) fn add(all: &mut Vec<Operation>) {
 }
 
 fn logic(all: &mut Vec<Operation>) {
-    let kinds: [(&str, fn(u32, u32) -> u32); 3] = [
+    let kinds: [(&str, Two); 3] = [
         ("a & b", |a, b| a & b),
         ("a | b", |a, b| a | b),
         ("a ^ b", |a, b| a ^ b),
@@ -50,7 +53,7 @@ fn logic(all: &mut Vec<Operation>) {
 fn shifts(all: &mut Vec<Operation>) {
     let accuracy = "§8.9: by b modulo 32";
     for (code, scalar, value) in [
-        ("a << b", U32, (|a, b| a << (b & 31)) as fn(u32, u32) -> u32),
+        ("a << b", U32, (|a, b| a << (b & 31)) as Two),
         ("a << b", I32, |a, b| a << (b & 31)),
         ("a >> b", U32, |a, b| a >> (b & 31)),
         ("a >> b", I32, |a, b| (a as i32 >> (b & 31)) as u32),
@@ -71,7 +74,10 @@ fn shifts(all: &mut Vec<Operation>) {
 /// The position of the highest bit that differs from the sign; all ones for none.
 fn first_leading(x: u32, signed: bool) -> u32 {
     let x = if signed && x >> 31 == 1 { !x } else { x };
-    (0..32).rev().find(|&bit| x >> bit & 1 == 1).unwrap_or(u32::MAX)
+    (0..32)
+        .rev()
+        .find(|&bit| x >> bit & 1 == 1)
+        .unwrap_or(u32::MAX)
 }
 
 fn counts(all: &mut Vec<Operation>) {
@@ -97,7 +103,11 @@ fn counts(all: &mut Vec<Operation>) {
                 bit => 31 - bit,
             }),
         );
-        one("countTrailingZeros(a)", "§17.5", word(move |x| lowest(x[0]).unwrap_or(32)));
+        one(
+            "countTrailingZeros(a)",
+            "§17.5",
+            word(move |x| lowest(x[0]).unwrap_or(32)),
+        );
         one(
             "countOneBits(a)",
             "§17.5",
@@ -225,7 +235,7 @@ fn booleans(all: &mut Vec<Operation>) {
         )
         .strict(),
     );
-    let kinds: [(&str, fn(u32, u32) -> u32); 4] = [
+    let kinds: [(&str, Two); 4] = [
         ("a & b", |a, b| a & b),
         ("a | b", |a, b| a | b),
         ("a == b", |a, b| u32::from(a == b)),
@@ -244,10 +254,7 @@ fn booleans(all: &mut Vec<Operation>) {
         );
     }
     // These have no vector form.
-    for (code, value) in [
-        ("a && b", (|a, b| a & b) as fn(u32, u32) -> u32),
-        ("a || b", |a, b| a | b),
-    ] {
+    for (code, value) in [("a && b", (|a, b| a & b) as Two), ("a || b", |a, b| a | b)] {
         all.push(
             whole(
                 format!("{code}, bool"),
@@ -255,7 +262,10 @@ fn booleans(all: &mut Vec<Operation>) {
                 vec![(Shape::Scalar, Bool); 2],
                 vec![(code, Shape::Scalar, Bool)],
                 combinations(2),
-                rule(vec![Bool; 2], vec![(Bool, word(move |x| value(x[0], x[1])))]),
+                rule(
+                    vec![Bool; 2],
+                    vec![(Bool, word(move |x| value(x[0], x[1])))],
+                ),
             )
             .strict(),
         );

@@ -19,7 +19,11 @@ pub(super) fn add(all: &mut Vec<Operation>) {
 /// "The value in T closest to truncate(X) and also exactly representable in
 /// the original floating point type."
 fn truncated(x: f64, low: f64, high: f64) -> f64 {
-    if x.is_nan() { 0.0 } else { x.trunc().clamp(low, high) }
+    if x.is_nan() {
+        0.0
+    } else {
+        x.trunc().clamp(low, high)
+    }
 }
 
 fn from_floats(all: &mut Vec<Operation>) {
@@ -36,7 +40,11 @@ fn from_floats(all: &mut Vec<Operation>) {
     };
     let accuracy = "§15.7.6: truncated, then the nearest value that both types have";
     for (code, scalar, meaning) in [
-        ("$i32(a)", Scalar::I32, to_integer(-2_147_483_648.0, 2_147_483_520.0)),
+        (
+            "$i32(a)",
+            Scalar::I32,
+            to_integer(-2_147_483_648.0, 2_147_483_520.0),
+        ),
         ("$u32(a)", Scalar::U32, to_integer(0.0, 4_294_967_040.0)),
     ] {
         all.push(
@@ -110,7 +118,7 @@ fn from_integers(all: &mut Vec<Operation>) {
             .strict(),
         );
     }
-    let booleans: Vec<Vec<u32>> = (0..256_u32).map(|i| vec![(i * 37 >> 3) & 1]).collect();
+    let booleans: Vec<Vec<u32>> = (0..256_u32).map(|i| vec![((i * 37) >> 3) & 1]).collect();
     for (to, code, one) in [
         (Float, "$f32(a)", 1.0_f32.to_bits()),
         (I32, "$i32(a)", 1),
@@ -178,7 +186,10 @@ fn bits(all: &mut Vec<Operation>) {
             .strict(),
         );
     }
-    for (from, to, code) in [(I32, U32, "bitcast<$u32>(a)"), (U32, I32, "bitcast<$i32>(a)")] {
+    for (from, to, code) in [
+        (I32, U32, "bitcast<$u32>(a)"),
+        (U32, I32, "bitcast<$i32>(a)"),
+    ] {
         all.push(
             componentwise(
                 format!("bitcast<{}>(a), {}", to.name(), from.name()),
@@ -214,7 +225,10 @@ fn half(all: &mut Vec<Operation>) {
             x[0]
         };
         if value.is_finite() && value.abs() <= f16.largest() {
-            let allowed = halves(value).into_iter().map(|half| F32.encode(half)).collect();
+            let allowed = halves(value)
+                .into_iter()
+                .map(|half| F32.encode(half))
+                .collect();
             Words {
                 allowed: Some(allowed),
                 own,

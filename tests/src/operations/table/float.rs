@@ -34,10 +34,36 @@ fn operators(all: &mut Vec<Operation>, ty: FloatType) {
             inputs::several(ty, 2, 11),
         )
     };
-    all.push(two("a + b", ROUNDED, rounded(ty, |x| x[0] + x[1], |x| x[0] + x[1])).strict());
-    all.push(two("a - b", ROUNDED, rounded(ty, |x| x[0] - x[1], |x| x[0] - x[1])).strict());
-    all.push(two("a * b", ROUNDED, rounded(ty, |x| x[0] * x[1], |x| x[0] * x[1])).strict());
-    let divided = nearest(ty, |t, x| t.div(x[0], x[1]), |x| x[0] / x[1], |x| x[0] / x[1]);
+    all.push(
+        two(
+            "a + b",
+            ROUNDED,
+            rounded(ty, |x| x[0] + x[1], |x| x[0] + x[1]),
+        )
+        .strict(),
+    );
+    all.push(
+        two(
+            "a - b",
+            ROUNDED,
+            rounded(ty, |x| x[0] - x[1], |x| x[0] - x[1]),
+        )
+        .strict(),
+    );
+    all.push(
+        two(
+            "a * b",
+            ROUNDED,
+            rounded(ty, |x| x[0] * x[1], |x| x[0] * x[1]),
+        )
+        .strict(),
+    );
+    let divided = nearest(
+        ty,
+        |t, x| t.div(x[0], x[1]),
+        |x| x[0] / x[1],
+        |x| x[0] / x[1],
+    );
     let accuracy = "§15.7.4.1: 2.5 ULP for |b| in [2^-126, 2^126], in f16 in [2^-14, 2^14]";
     all.push(two("a / b", accuracy, divided).strict());
     let remainder = inexact(
@@ -45,7 +71,11 @@ fn operators(all: &mut Vec<Operation>, ty: FloatType) {
         |t, x| formulas::remainder(&t, x[0], x[1]),
         |x| x[0] - x[1] * (x[0] / x[1]).trunc(),
     );
-    all.push(two("a % b", "§15.7.4.1: inherited from a - b * trunc(a / b)", remainder));
+    all.push(two(
+        "a % b",
+        "§15.7.4.1: inherited from a - b * trunc(a / b)",
+        remainder,
+    ));
     all.push(
         componentwise(
             name("-a"),
@@ -72,7 +102,8 @@ fn operators(all: &mut Vec<Operation>, ty: FloatType) {
 
 fn comparisons(all: &mut Vec<Operation>, ty: FloatType) {
     let s = Scalar::from(ty);
-    let kinds: [(&str, fn(f64, f64) -> bool); 6] = [
+    type Compare = fn(f64, f64) -> bool;
+    let kinds: [(&str, Compare); 6] = [
         ("a == b", |a, b| a == b),
         ("a != b", |a, b| a != b),
         ("a < b", |a, b| a < b),
@@ -132,10 +163,26 @@ fn steps(all: &mut Vec<Operation>, ty: FloatType) {
         });
     };
     one("abs(a)", rounded(ty, |x| x[0].abs(), |x| x[0].abs()), true);
-    one("floor(a)", rounded(ty, |x| x[0].floor(), |x| x[0].floor()), true);
-    one("ceil(a)", rounded(ty, |x| -(-x[0]).floor(), |x| x[0].ceil()), true);
-    one("trunc(a)", rounded(ty, |x| x[0].trunc(), |x| x[0].trunc()), true);
-    one("round(a)", rounded(ty, |x| round(x[0]), |x| x[0].round_ties_even()), true);
+    one(
+        "floor(a)",
+        rounded(ty, |x| x[0].floor(), |x| x[0].floor()),
+        true,
+    );
+    one(
+        "ceil(a)",
+        rounded(ty, |x| -(-x[0]).floor(), |x| x[0].ceil()),
+        true,
+    );
+    one(
+        "trunc(a)",
+        rounded(ty, |x| x[0].trunc(), |x| x[0].trunc()),
+        true,
+    );
+    one(
+        "round(a)",
+        rounded(ty, |x| round(x[0]), |x| x[0].round_ties_even()),
+        true,
+    );
     let sign = |x: &[Exact]| Exact::new(x[0].signum());
     let ieee = |x: &[f32]| {
         if x[0] > 0.0 {
@@ -148,7 +195,11 @@ fn steps(all: &mut Vec<Operation>, ty: FloatType) {
     };
     one("sign(a)", rounded(ty, sign, ieee), true);
     let saturate = |x: &[Exact]| clamp(x[0], Exact::new(0.0), Exact::new(1.0));
-    one("saturate(a)", rounded(ty, saturate, |x| max(x[0], 0.0).min(1.0)), true);
+    one(
+        "saturate(a)",
+        rounded(ty, saturate, |x| max(x[0], 0.0).min(1.0)),
+        true,
+    );
 }
 
 fn less(a: Exact, b: Exact) -> bool {
@@ -232,7 +283,10 @@ fn choices(all: &mut Vec<Operation>, ty: FloatType) {
     let cases = inputs::several(ty, 3, 17);
     let ordered = cases
         .iter()
-        .filter(|case| !(ty.decode(case[1]) > ty.decode(case[2])))
+        .filter(|case| {
+            let (low, high) = (ty.decode(case[1]), ty.decode(case[2]));
+            low <= high || low.is_nan() || high.is_nan()
+        })
         .cloned()
         .collect();
     all.push(
@@ -271,7 +325,11 @@ fn choices(all: &mut Vec<Operation>, ty: FloatType) {
         format!("select(a, b, c), {}", s.name()),
         "§17.3: one of the operands, subnormal numbers preserved (§15.7.2)",
         &[s, s, Scalar::Bool],
-        vec![("select(a, b, c)", s, super::word(|x| x[if x[2] == 0 { 0 } else { 1 }]))],
+        vec![(
+            "select(a, b, c)",
+            s,
+            super::word(|x| x[if x[2] == 0 { 0 } else { 1 }]),
+        )],
         inputs::several(ty, 2, 19)
             .into_iter()
             .enumerate()
@@ -316,7 +374,11 @@ fn parts(all: &mut Vec<Operation>, ty: FloatType) {
                 s,
                 rounded(ty, |x| x[0] - x[0].trunc(), |x| x[0] - x[0].trunc()),
             ),
-            ("modf(a).whole", s, rounded(ty, |x| x[0].trunc(), |x| x[0].trunc())),
+            (
+                "modf(a).whole",
+                s,
+                rounded(ty, |x| x[0].trunc(), |x| x[0].trunc()),
+            ),
         ],
         inputs::one(ty, (-4.0, 4.0), 21),
     ));
@@ -469,7 +531,11 @@ fn blends(all: &mut Vec<Operation>, ty: FloatType) {
         move |x| formulas::smoothstep(&reals, x[0], x[1], x[2]),
     );
     for (code, accuracy, meaning) in [
-        ("mix(a, b, c)", "§15.7.4.1: inherited from a * (1.0 - c) + b * c", mix),
+        (
+            "mix(a, b, c)",
+            "§15.7.4.1: inherited from a * (1.0 - c) + b * c",
+            mix,
+        ),
         (
             "smoothstep(a, b, c)",
             "§15.7.4.1: inherited from t * t * (3.0 - 2.0 * t) with t = clamp((c - a) / (b - a), 0.0, 1.0)",

@@ -117,9 +117,12 @@ fn functions(all: &mut Vec<Operation>) {
             .strict(),
         );
     };
-    one("abs(a)", I32, "§17.5: the most negative number is its own", |x| {
-        (x as i32).wrapping_abs() as u32
-    });
+    one(
+        "abs(a)",
+        I32,
+        "§17.5: the most negative number is its own",
+        |x| (x as i32).wrapping_abs() as u32,
+    );
     one("abs(a)", U32, "§17.5", |x| x);
     one("sign(a)", I32, "§17.5", |x| (x as i32).signum() as u32);
     for (scalar, meaning) in [

@@ -9,8 +9,7 @@ use super::super::{formulas, inputs};
 use super::vector::inherited;
 use super::{rounded, whole, word};
 
-const PRODUCT: &str =
-    "§8.7: each element is the dot product of a row and a column; §15.7.4.1: inherited from the sum of products, in any order";
+const PRODUCT: &str = "§8.7: each element is the dot product of a row and a column; §15.7.4.1: inherited from the sum of products, in any order";
 
 /// Adds all of them for a type.
 pub(super) fn add(all: &mut Vec<Operation>, ty: FloatType) {
@@ -92,12 +91,16 @@ fn products(all: &mut Vec<Operation>, ty: FloatType) {
                 move |t, x| {
                     let (vector, matrix) = x.split_at(rows);
                     let columns = matrix.chunks(rows);
-                    columns.map(|column| formulas::dot(&t, vector, column)).collect()
+                    columns
+                        .map(|column| formulas::dot(&t, vector, column))
+                        .collect()
                 },
                 move |x| {
                     let (vector, matrix) = x.split_at(rows);
                     let columns = matrix.chunks(rows);
-                    columns.map(|column| formulas::dot(&Reals, vector, column)).collect()
+                    columns
+                        .map(|column| formulas::dot(&Reals, vector, column))
+                        .collect()
                 },
             ),
         ));
@@ -108,7 +111,13 @@ fn products(all: &mut Vec<Operation>, ty: FloatType) {
 fn elementwise(all: &mut Vec<Operation>, ty: FloatType) {
     let s = Scalar::from(ty);
     let accuracy = "§8.7: element by element; §15.7.4.1: correctly rounded";
-    for shape in [Shape::Vector(2), Shape::Vector(3), Shape::Vector(4), Shape::Matrix(2, 3), Shape::Matrix(4, 4)] {
+    for shape in [
+        Shape::Vector(2),
+        Shape::Vector(3),
+        Shape::Vector(4),
+        Shape::Matrix(2, 3),
+        Shape::Matrix(4, 4),
+    ] {
         let count = shape.count();
         let scaled = |first: usize, scalar: usize| -> Vec<(Scalar, Meaning)> {
             (0..count)
@@ -197,7 +206,14 @@ fn permutations(n: usize) -> Vec<(Vec<usize>, f64)> {
                 let mut longer = shorter.clone();
                 longer.insert(place, n - 1);
                 let crossed = n - 1 - place;
-                (longer, if crossed % 2 == 0 { sign } else { -sign })
+                (
+                    longer,
+                    if crossed.is_multiple_of(2) {
+                        sign
+                    } else {
+                        -sign
+                    },
+                )
             })
         })
         .collect()
@@ -213,13 +229,17 @@ fn determinant(all: &mut Vec<Operation>, ty: FloatType, n: usize) {
     let leibniz = {
         let terms = terms.clone();
         move |x: &[Exact]| {
-            terms.iter().fold(Exact::new(0.0), |sum, (permutation, sign)| {
-                let product = permutation
-                    .iter()
-                    .enumerate()
-                    .fold(Exact::new(*sign), |product, (column, row)| product * x[column * n + row]);
-                sum + product
-            })
+            terms
+                .iter()
+                .fold(Exact::new(0.0), |sum, (permutation, sign)| {
+                    let product = permutation
+                        .iter()
+                        .enumerate()
+                        .fold(Exact::new(*sign), |product, (column, row)| {
+                            product * x[column * n + row]
+                        });
+                    sum + product
+                })
         }
     };
     let exact = leibniz.clone();
@@ -235,7 +255,9 @@ fn determinant(all: &mut Vec<Operation>, ty: FloatType, n: usize) {
         let roundings = (2 * n + terms.len()) as f64;
         let unit = table.of(power_of_two(-23), power_of_two(-10)) * roundings;
         // Each operation may also lose what is subnormal, times the elements.
-        let largest = x.iter().fold(1.0, |largest: f64, x| largest.max(x.magnitude()));
+        let largest = x
+            .iter()
+            .fold(1.0, |largest: f64, x| largest.max(x.magnitude()));
         let lost = roundings * ty.smallest_normal() * largest.powi(n as i32) * terms.len() as f64;
         if largest.powi(n as i32) * terms.len() as f64 > ty.largest() {
             return vec![Interval::ANY];

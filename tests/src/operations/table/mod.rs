@@ -14,9 +14,7 @@ use super::accuracy::Table;
 use super::exact::Exact;
 use super::float::FloatType;
 use super::interval::Interval;
-use super::operation::{
-    Float, Form, Meaning, Operation, Output, Rule, Scalar, Shape, Words, rule,
-};
+use super::operation::{Float, Form, Meaning, Operation, Output, Rule, Scalar, Shape, Words, rule};
 
 /// Every operation on 32-bit numbers and booleans.
 #[must_use]
@@ -190,14 +188,26 @@ mod tests {
     #[test]
     fn names_are_unique_and_cases_have_the_right_size() {
         let all = all();
-        let names: BTreeSet<&str> = all.iter().map(|operation| operation.name.as_str()).collect();
+        let names: BTreeSet<&str> = all
+            .iter()
+            .map(|operation| operation.name.as_str())
+            .collect();
         assert_eq!(names.len(), all.len());
         for operation in &all {
             let width = operation.input_scalars().count();
             assert!(operation.cases.len() >= 100, "{}", operation.name);
-            assert!(operation.cases.iter().all(|case| case.len() == width), "{}", operation.name);
+            assert!(
+                operation.cases.iter().all(|case| case.len() == width),
+                "{}",
+                operation.name
+            );
             let expected = (operation.rule)(&operation.cases[0]);
-            assert_eq!(expected.len(), operation.output_scalars().count(), "{}", operation.name);
+            assert_eq!(
+                expected.len(),
+                operation.output_scalars().count(),
+                "{}",
+                operation.name
+            );
         }
     }
 
@@ -209,9 +219,9 @@ mod tests {
                 .cases
                 .iter()
                 .filter(|case| {
-                    (operation.rule)(case)
-                        .iter()
-                        .any(|expected| expected.allowed != super::super::operation::Allowed::Anything)
+                    (operation.rule)(case).iter().any(|expected| {
+                        expected.allowed != super::super::operation::Allowed::Anything
+                    })
                 })
                 .count();
             assert!(

@@ -20,10 +20,26 @@ struct Normalised {
 }
 
 const NORMALISED: [Normalised; 4] = [
-    Normalised { name: "4x8snorm", bits: 8, signed: true },
-    Normalised { name: "4x8unorm", bits: 8, signed: false },
-    Normalised { name: "2x16snorm", bits: 16, signed: true },
-    Normalised { name: "2x16unorm", bits: 16, signed: false },
+    Normalised {
+        name: "4x8snorm",
+        bits: 8,
+        signed: true,
+    },
+    Normalised {
+        name: "4x8unorm",
+        bits: 8,
+        signed: false,
+    },
+    Normalised {
+        name: "2x16snorm",
+        bits: 16,
+        signed: true,
+    },
+    Normalised {
+        name: "2x16unorm",
+        bits: 16,
+        signed: false,
+    },
 ];
 
 impl Normalised {
@@ -34,9 +50,16 @@ impl Normalised {
     /// `floor(0.5 + scale * clamp(x))`, where the clamped value is exact and
     /// the intermediate results are correctly rounded.
     fn pack(self, word: u32) -> Words {
-        let (low, mask) = (if self.signed { -1.0 } else { 0.0 }, (1_u32 << self.bits) - 1);
+        let (low, mask) = (
+            if self.signed { -1.0 } else { 0.0 },
+            (1_u32 << self.bits) - 1,
+        );
         let value = F32.decode(word);
-        let clamped = if value.is_nan() { low } else { value.clamp(low, 1.0) };
+        let clamped = if value.is_nan() {
+            low
+        } else {
+            value.clamp(low, 1.0)
+        };
         let product = F32.nearest(Exact::new(clamped) * Exact::new(self.scale()));
         let sum = F32.nearest(Exact::new(product) + Exact::new(0.5));
         let own = sum.floor() as i64 as u32 & mask;
@@ -134,11 +157,7 @@ fn normalised(all: &mut Vec<Operation>, format: Normalised) {
         format!("{function}(a)"),
         "§15.7.4.1: 3 ULP",
         vec![(Shape::Scalar, Scalar::U32)],
-        vec![(
-            &format!("{function}(a)"),
-            Shape::Vector(count),
-            Scalar::F32,
-        )],
+        vec![(&format!("{function}(a)"), Shape::Vector(count), Scalar::F32)],
         words_of_fields(format.bits),
         rule(vec![Scalar::U32], meanings),
     ));
@@ -147,10 +166,14 @@ fn normalised(all: &mut Vec<Operation>, format: Normalised) {
 /// Words whose fields have every value of a byte, and many of a half.
 fn words_of_fields(bits: u32) -> Vec<Vec<u32>> {
     let mut cases = inputs::integer_cases(1, 73);
-    cases.extend((0..0x1_0000_u32).step_by(if bits == 8 { 257 } else { 29 }).map(|low| {
-        let high = low.wrapping_mul(0x9e3) & 0xffff;
-        vec![low | high << 16]
-    }));
+    cases.extend(
+        (0..0x1_0000_u32)
+            .step_by(if bits == 8 { 257 } else { 29 })
+            .map(|low| {
+                let high = low.wrapping_mul(0x9e3) & 0xffff;
+                vec![low | high << 16]
+            }),
+    );
     cases
 }
 
@@ -166,7 +189,10 @@ fn floats(all: &mut Vec<Operation>) {
         }
         let own = f16.encode(f16.nearest(Exact::new(value)));
         if value.abs() <= f16.largest() {
-            let allowed = halves(value).into_iter().map(|half| f16.encode(half)).collect();
+            let allowed = halves(value)
+                .into_iter()
+                .map(|half| f16.encode(half))
+                .collect();
             Words {
                 allowed: Some(allowed),
                 own,
@@ -265,7 +291,11 @@ fn integers(all: &mut Vec<Operation>) {
         );
     }
     for (code, scalar, of) in [
-        ("unpack4xI8(a)", I32, (|w, field| signed_byte(w, field) as u32) as fn(u32, u32) -> u32),
+        (
+            "unpack4xI8(a)",
+            I32,
+            (|w, field| signed_byte(w, field) as u32) as fn(u32, u32) -> u32,
+        ),
         ("unpack4xU8(a)", U32, byte),
     ] {
         all.push(
@@ -285,7 +315,11 @@ fn integers(all: &mut Vec<Operation>) {
             .strict(),
         );
     }
-    let unsigned = |x: &[u32]| (0..4).map(|field| byte(x[0], field) * byte(x[1], field)).sum();
+    let unsigned = |x: &[u32]| {
+        (0..4)
+            .map(|field| byte(x[0], field) * byte(x[1], field))
+            .sum()
+    };
     let signed = |x: &[u32]| {
         let product = |field| signed_byte(x[0], field) * signed_byte(x[1], field);
         (0..4).map(product).sum::<i32>() as u32

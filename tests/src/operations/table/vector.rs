@@ -35,7 +35,12 @@ pub(super) fn inherited(
                 }
             })
             .collect();
-        let exact = exact(&values.iter().map(|&value| Exact::new(value)).collect::<Vec<_>>());
+        let exact = exact(
+            &values
+                .iter()
+                .map(|&value| Exact::new(value))
+                .collect::<Vec<_>>(),
+        );
         let measurable = finite && !values.iter().any(|&value| ty.is_subnormal(value));
         table(Table(ty), &may_be)
             .into_iter()
@@ -78,7 +83,11 @@ fn reductions(all: &mut Vec<Operation>, ty: FloatType) {
         ));
     }
     for n in 1..=4 {
-        let shape = if n == 1 { Shape::Scalar } else { Shape::Vector(n) };
+        let shape = if n == 1 {
+            Shape::Scalar
+        } else {
+            Shape::Vector(n)
+        };
         all.push(whole(
             format!("length(a), {}", shape.of(s)),
             "§15.7.4.1: inherited from sqrt(dot(a, a)), of a scalar from sqrt(a * a)",

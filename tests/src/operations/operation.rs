@@ -417,6 +417,10 @@ impl Float {
         if let Some(bits) = bits {
             for values in &all {
                 flushed.extend(self.bits(values));
+                // Processors flush what is subnormal before it is rounded.
+                if self.ty.is_subnormal(self.exact(values).head()) {
+                    flushed.push(0);
+                }
             }
             flushed.push(bits);
             for index in 0..flushed.len() {

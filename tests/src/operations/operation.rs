@@ -342,8 +342,8 @@ pub(crate) struct Float {
 pub(crate) struct Words {
     /// By WGSL; `None` for anything.
     pub(crate) allowed: Option<Vec<u32>>,
-    /// By the interpreter's semantics.
-    pub(crate) own: u32,
+    /// By the interpreter's semantics; `None` where those leave it open too.
+    pub(crate) own: Option<u32>,
 }
 
 impl Words {
@@ -351,14 +351,23 @@ impl Words {
     pub(crate) fn exactly(word: u32) -> Self {
         Self {
             allowed: Some(vec![word]),
-            own: word,
+            own: Some(word),
         }
     }
 
     /// Left open by WGSL, but not by the interpreter.
     pub(crate) fn open(own: u32) -> Self {
-        Self { allowed: None, own }
+        Self {
+            allowed: None,
+            own: Some(own),
+        }
     }
+
+    /// Left open by both, as the payload of a NaN is.
+    pub(crate) const ANYTHING: Self = Self {
+        allowed: None,
+        own: None,
+    };
 }
 
 /// The rule of a componentwise operation with one meaning per output.
@@ -499,7 +508,7 @@ fn expect_words(
     let special = scalars
         .iter()
         .zip(&alternatives[0])
-        .chain([(&scalar, &all[0].own)])
+        .chain(all[0].own.iter().map(|own| (&scalar, own)))
         .any(|(scalar, &word)| scalar.float().is_some_and(|ty| is_non_finite(ty, word)));
     Expectation {
         allowed: allowed.map_or(Allowed::Anything, |mut words| {
@@ -507,8 +516,8 @@ fn expect_words(
             words.dedup();
             Allowed::Words(words)
         }),
-        bits: Some(all[0].own),
-        flushed: all.iter().map(|words| words.own).collect(),
+        bits: all[0].own,
+        flushed: all.iter().filter_map(|words| words.own).collect(),
         exact: None,
         special,
     }

@@ -167,7 +167,7 @@ fn bits(all: &mut Vec<Operation>) {
             if F32.is_subnormal(value) {
                 Words {
                     allowed: Some(vec![x[0], 0, 0x8000_0000]),
-                    own: x[0],
+                    own: Some(x[0]),
                 }
             } else if value.is_finite() {
                 Words::exactly(x[0])
@@ -231,7 +231,7 @@ fn half(all: &mut Vec<Operation>) {
                 .collect();
             Words {
                 allowed: Some(allowed),
-                own,
+                own: Some(own),
             }
         } else {
             Words::open(own)

@@ -388,7 +388,7 @@ fn parts(all: &mut Vec<Operation>, ty: FloatType) {
         if is_zero_or_normal(ty, value) {
             Words {
                 allowed: Some(vec![own]),
-                own,
+                own: Some(own),
             }
         } else {
             Words::open(own)

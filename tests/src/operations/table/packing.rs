@@ -74,7 +74,7 @@ impl Normalised {
             .collect();
         Words {
             allowed: Some(allowed),
-            own,
+            own: Some(own),
         }
     }
 
@@ -182,14 +182,10 @@ fn floats(all: &mut Vec<Operation>) {
     let in_range = move |word: u32| F32.decode(word).abs() <= f16.largest();
     let pack = move |words: &[u32], field: usize| {
         let value = F32.decode(words[field]);
-        let own = if value.is_nan() {
-            // What fits of the payload, and never that of an infinity.
-            let payload = words[field] >> 13 & 0x3ff;
-            let payload = if payload == 0 { 0x200 } else { payload };
-            words[field] >> 16 & 0x8000 | 0x7c00 | payload
-        } else {
-            f16.encode(f16.nearest(Exact::new(value)))
-        };
+        if value.is_nan() {
+            return Words::ANYTHING;
+        }
+        let own = f16.encode(f16.nearest(Exact::new(value)));
         // A number out of range makes the whole word indeterminate.
         if !words.iter().all(|&word| in_range(word)) {
             return Words::open(own);
@@ -201,7 +197,7 @@ fn floats(all: &mut Vec<Operation>) {
                     .map(|half| f16.encode(half))
                     .collect(),
             ),
-            own,
+            own: Some(own),
         }
     };
     let mut random = inputs::Random::new(74);
@@ -235,7 +231,7 @@ fn floats(all: &mut Vec<Operation>) {
         } else if f16.is_subnormal(value) {
             Words {
                 allowed: Some(vec![own, 0, 0x8000_0000]),
-                own,
+                own: Some(own),
             }
         } else {
             Words::exactly(own)

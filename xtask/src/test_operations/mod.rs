@@ -24,7 +24,7 @@ use execute::{OperationRun, Outcome, chosen};
 
 pub use execute::{Job, ResultsError, execute};
 
-/// Name of the hidden command that [`execute`] serves.
+/// Name of the hidden command that [`execute()`] serves.
 pub const COMMAND: &str = "execute-operations";
 
 /// Run every operator and built-in function of WGSL on the interpreter and on

@@ -1,6 +1,9 @@
-//! What the tests across backends share: executors, and images compared.
+//! What the tests across backends share: executors, images compared, and every
+//! operation of WGSL with what it may give.
 
 #![forbid(unsafe_code)]
+
+pub mod operations;
 
 use etalon::ash::{AshBackend, AshOptions, Validation};
 use etalon::backend::{Backend, BackendError, CapturedData, Execution};

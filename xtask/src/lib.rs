@@ -10,8 +10,10 @@ pub mod measure;
 pub mod setup;
 pub mod size;
 pub mod test_backends;
+pub mod test_operations;
 pub mod vectors;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -27,6 +29,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Task {
     TestBackends(Box<test_backends::Options>),
+    TestOperations(test_operations::Options),
     /// Every kernel on the interpreter and on a Vulkan driver, side by side;
     /// `--help` after it says more.
     BenchKernels(measure::Forwarded),
@@ -37,21 +40,23 @@ enum Task {
     /// Run one job of test-backends.
     #[command(hide = true, name = test_backends::COMMAND)]
     Execute(execute::Job),
+    /// Run every operation on one executor.
+    #[command(hide = true, name = test_operations::COMMAND)]
+    ExecuteOperations(test_operations::Job),
 }
 
 /// Runs the task that the command line asks for.
 #[must_use]
 pub fn main() -> ExitCode {
     match Arguments::parse().task {
-        Task::TestBackends(options) => {
-            let tested = match std::env::current_exe() {
-                Ok(program) => {
-                    test_backends::run(&options, &program).map_err(|error| error.to_string())
-                }
-                Err(error) => Err(format!("this program cannot find itself: {error}")),
-            };
-            conclude(tested.map(|report| report.ok))
-        }
+        Task::TestBackends(options) => conclude(this_program().and_then(|program| {
+            test_backends::run(&options, &program)
+                .map(|report| report.ok)
+                .map_err(|error| error.to_string())
+        })),
+        Task::TestOperations(options) => conclude(this_program().and_then(|program| {
+            test_operations::run(&options, &program).map_err(|error| error.to_string())
+        })),
         Task::BenchKernels(arguments) => {
             conclude(measure::run("kernels", &arguments).map_err(|error| error.to_string()))
         }
@@ -66,7 +71,17 @@ pub fn main() -> ExitCode {
                 .map(|()| true)
                 .map_err(|error| error.to_string()),
         ),
+        Task::ExecuteOperations(job) => conclude(
+            test_operations::execute(&job)
+                .map(|()| true)
+                .map_err(|error| error.to_string()),
+        ),
     }
+}
+
+/// Where this program is: it starts itself for its hidden commands.
+fn this_program() -> Result<PathBuf, String> {
+    std::env::current_exe().map_err(|error| format!("this program cannot find itself: {error}"))
 }
 
 /// The exit status: success, or failure and on standard error why.

@@ -97,14 +97,31 @@ impl Column {
     /// Medians of the ratios to another column, round by round.
     #[must_use]
     pub fn ratio(&self, other: &Self) -> Times {
-        let of = |get: fn(&Times) -> f64| {
-            let pairs = self.rounds.iter().zip(&other.rounds);
-            median(&pairs.map(|(a, b)| get(a) / get(b)).collect::<Vec<_>>())
+        Times {
+            wall: median(&self.ratios(other, |times| times.wall)),
+            processor: median(&self.ratios(other, |times| times.processor)),
+        }
+    }
+
+    /// How much the ratios to another column differ between rounds: the
+    /// largest over the smallest.
+    #[must_use]
+    pub fn spread(&self, other: &Self) -> Times {
+        let of = |get| {
+            let ratios = self.ratios(other, get);
+            let largest = ratios.iter().copied().fold(0.0, f64::max);
+            let smallest = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+            largest / smallest
         };
         Times {
             wall: of(|times| times.wall),
             processor: of(|times| times.processor),
         }
+    }
+
+    fn ratios(&self, other: &Self, get: fn(&Times) -> f64) -> Vec<f64> {
+        let pairs = self.rounds.iter().zip(&other.rounds);
+        pairs.map(|(a, b)| get(a) / get(b)).collect()
     }
 }
 

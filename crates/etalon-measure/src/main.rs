@@ -115,6 +115,9 @@ struct Kernels {
     /// Write all figures to this file.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Also print tables in Markdown; with `--profile`, only those.
+    #[arg(long)]
+    markdown: bool,
     /// Instead of comparing, report the hottest operations and source lines by
     /// the interpreter's own profile, on the last of the tiers.
     #[arg(long)]
@@ -157,6 +160,14 @@ impl Kernels {
             println!("{}", table::line(row));
         })
         .map_err(|error| error.to_string())?;
+        println!("{}", table::spreads(&rows));
+        if self.markdown {
+            for arithmetic in settings.arithmetics {
+                let of = |row: &&compare::Row| row.arithmetic == arithmetic;
+                let rows: Vec<_> = rows.iter().filter(of).cloned().collect();
+                println!("\n{arithmetic}\n\n{}", table::markdown(&rows));
+            }
+        }
         if let Some(path) = &self.json {
             let text = serde_json::to_string_pretty(&rows).map_err(|error| error.to_string())?;
             std::fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -174,7 +185,15 @@ impl Kernels {
             threads: self.what.threads,
             repetitions: 3,
         };
+        let mut before = None;
         profile::profile(&settings, |kernel| {
+            if self.markdown {
+                if before.replace(kernel.arithmetic) != Some(kernel.arithmetic) {
+                    println!("\n{}\n\n{}", kernel.arithmetic, profile::SUMMARY_HEADING);
+                }
+                println!("{}", profile::summary(kernel));
+                return;
+            }
             println!("{}", profile::report(kernel, self.most));
             if self.listing {
                 println!("{}", kernel.profile);

@@ -125,6 +125,36 @@ pub fn report(kernel: &KernelProfile, most: usize) -> String {
     text
 }
 
+/// A kernel in one row of a table in Markdown; its columns are
+/// [`SUMMARY_HEADING`].
+#[must_use]
+pub fn summary(kernel: &KernelProfile) -> String {
+    let total = kernel.profile.total();
+    let hottest: Vec<String> = kernel
+        .profile
+        .by_operation()
+        .iter()
+        .take(3)
+        .map(|(name, cost)| {
+            let share = 100.0 * cost.nanoseconds / total.nanoseconds.max(f64::MIN_POSITIVE);
+            format!("{name} {share:.0} %")
+        })
+        .collect();
+    format!(
+        "| {} | {} | {:.1} | {:.1} | {} |",
+        kernel.profile.kernel,
+        total.executions / kernel.repetitions as u64,
+        100.0 * total.active_share(),
+        total.nanoseconds_each(),
+        hottest.join(", ")
+    )
+}
+
+/// The heading of the table of [`summary`].
+pub const SUMMARY_HEADING: &str =
+    "| kernel | operations executed | lanes active, % | ns per operation | most time in |
+|---|---|---|---|---|";
+
 fn line(name: &str, cost: &Cost, total: f64, repetitions: usize) -> String {
     format!(
         "    {name:<32} {:>12} {:>8.1} {:>9.1} {:>10.3} {:>6.1}\n",
@@ -134,4 +164,44 @@ fn line(name: &str, cost: &Cost, total: f64, repetitions: usize) -> String {
         cost.nanoseconds * 1e-6 / repetitions as f64,
         100.0 * cost.nanoseconds / total.max(f64::MIN_POSITIVE)
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::subjects::subject;
+
+    #[test]
+    fn reports_name_operations_and_lines() {
+        let settings = Settings {
+            size: Size {
+                width: 40,
+                height: 24,
+            },
+            subjects: vec![subject("composite").unwrap(), subject("exposure").unwrap()],
+            kernel: "composite".to_owned(),
+            arithmetics: vec![Arithmetic::Strict, Arithmetic::Fast],
+            tier: None,
+            threads: 2,
+            repetitions: 2,
+        };
+        let mut seen = Vec::new();
+        profile(&settings, |kernel| {
+            let report = report(kernel, 1000);
+            assert!(report.contains("image.load"), "{report}");
+            assert!(report.contains("composite/composite.wesl:"), "{report}");
+            // Every invocation stores its texel, and no other lane.
+            let store = kernel.profile.by_operation();
+            let store = store.iter().find(|(name, _)| name == "image.store");
+            assert_eq!(store.unwrap().1.active_lanes, 2 * 40 * 24);
+            let row = summary(kernel);
+            assert_eq!(
+                row.matches('|').count(),
+                SUMMARY_HEADING.lines().next().unwrap().matches('|').count()
+            );
+            seen.push(kernel.arithmetic);
+        })
+        .unwrap();
+        assert_eq!(seen, [Arithmetic::Strict, Arithmetic::Fast]);
+    }
 }

@@ -1,6 +1,7 @@
 //! Measurements as text.
 
-use crate::compare::Row;
+use crate::clock::median;
+use crate::compare::{Row, Times};
 
 /// The heading of a table of rows.
 #[must_use]
@@ -72,12 +73,85 @@ pub fn line(row: &Row) -> String {
     line
 }
 
+/// Rows of one arithmetic as a table in Markdown, for keeping: milliseconds on
+/// the wall, and ratios to the first column, on the wall and by processor time.
+/// Those over their target are bold.
+#[must_use]
+pub fn markdown(rows: &[Row]) -> String {
+    let Some(first) = rows.first() else {
+        return String::new();
+    };
+    let reference = is_reference(first);
+    let mut head = "| kernel |".to_owned();
+    let mut rule = "|---|".to_owned();
+    for (index, column) in first.columns.iter().enumerate() {
+        let name = column.executor.split(" (").next().unwrap_or_default();
+        if reference && index > 0 {
+            head += &format!(" {name} ms | × wall | × cpu |");
+            rule += "---|---|---|";
+        } else {
+            head += &format!(" {name} ms |");
+            rule += "---|";
+        }
+    }
+    let mut text = format!("{head}\n{rule}\n");
+    for row in rows {
+        text += &format!("| {} |", row.kernel);
+        for (index, column) in row.columns.iter().enumerate() {
+            text += &format!(" {} |", digits(column.median().wall));
+            if reference && index > 0 {
+                let ratio = column.ratio(&row.columns[0]);
+                let target = target(row, &column.executor).unwrap_or(f64::INFINITY);
+                for ratio in [ratio.wall, ratio.processor] {
+                    let strong = if ratio > target { "**" } else { "" };
+                    text += &format!(" {strong}{ratio:.2}{strong} |");
+                }
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// How much ratios differed between the rounds of a row: the median over rows
+/// and tiers, and the worst, on the wall and by processor time.
+#[must_use]
+pub fn spreads(rows: &[Row]) -> String {
+    let of = |get: fn(&Times) -> f64| {
+        let spreads: Vec<f64> = rows
+            .iter()
+            .filter(|row| is_reference(row))
+            .flat_map(|row| {
+                let others = row.columns.iter().skip(1);
+                others.map(|column| get(&column.spread(&row.columns[0])))
+            })
+            .filter(|spread| spread.is_finite())
+            .collect();
+        let worst = spreads.iter().copied().fold(0.0, f64::max);
+        format!("median {:.2}, worst {worst:.2}", median(&spreads))
+    };
+    format!(
+        "largest over smallest ratio of a row: on the wall {}; by processor time {}",
+        of(|times| times.wall),
+        of(|times| times.processor)
+    )
+}
+
+/// Three digits at least, two after the point at most.
+fn digits(value: f64) -> String {
+    if value >= 10.0 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:.2}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use etalon_core::kernel::Arithmetic;
 
     use super::*;
-    use crate::compare::{Column, Times};
+    use crate::compare::Column;
     use crate::subjects::Targets;
 
     fn column(executor: &str, rounds: &[(f64, f64)]) -> Column {
@@ -128,6 +202,25 @@ mod tests {
             ["5.000", "10.000", "0.47", "0.47"]
         );
         assert!(heading(&row).contains("driver"));
+    }
+
+    #[test]
+    fn tables_in_markdown_have_the_same_figures() {
+        let reference = column("driver (x)", &[(10.0, 20.0), (20.0, 40.0)]);
+        let bad = column("avx2", &[(7.0, 12.0), (16.0, 24.0)]);
+        let rows = [row(vec![reference, bad])];
+        let text = markdown(&rows);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "| kernel | driver ms | avx2 ms | × wall | × cpu |"
+        );
+        assert_eq!(lines[1].matches('|').count(), lines[0].matches('|').count());
+        assert_eq!(lines[2], "| ssr/march | 15.0 | 11.5 | **0.75** | 0.60 |");
+        // 0.8 over 0.7, and twice the same.
+        assert!(spreads(&rows).contains("wall median 1.14, worst 1.14"));
+        assert!(spreads(&rows).contains("processor time median 1.00"));
+        assert_eq!(markdown(&[]), "");
     }
 
     #[test]

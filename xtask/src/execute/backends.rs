@@ -40,21 +40,41 @@ impl Opened {
 ///
 /// # Errors
 /// If there is no such device.
-pub(super) fn open(job: &Job) -> Result<Opened, BackendError> {
-    let device: Box<dyn Backend> = match job.backend {
-        BackendKind::Cpu => {
-            return Ok(Opened::Cpu(Box::new(CpuBackend::new(&CpuOptions {
-                threads: job.threads,
-                checks: if job.checks {
-                    Checks::all()
-                } else {
-                    Checks::NONE
-                },
-                ..CpuOptions::default()
-            })?)));
-        }
+pub(super) fn open_for(job: &Job) -> Result<Opened, BackendError> {
+    if job.backend != BackendKind::Cpu {
+        return open(job.backend, job.api, job.threads, job.validate).map(Opened::Device);
+    }
+    let options = CpuOptions {
+        threads: job.threads,
+        checks: if job.checks {
+            Checks::all()
+        } else {
+            Checks::NONE
+        },
+        ..CpuOptions::default()
+    };
+    Ok(Opened::Cpu(Box::new(CpuBackend::new(&options)?)))
+}
+
+/// A backend on the device that the environment leaves it: `threads` are those
+/// of the interpreter, 0 for as many as there are processors; with `validate`,
+/// messages of the validation layer are errors of ash.
+///
+/// # Errors
+/// If there is no such device.
+pub(crate) fn open(
+    backend: BackendKind,
+    api: Api,
+    threads: usize,
+    validate: bool,
+) -> Result<Box<dyn Backend>, BackendError> {
+    Ok(match backend {
+        BackendKind::Cpu => Box::new(CpuBackend::new(&CpuOptions {
+            threads,
+            ..CpuOptions::default()
+        })?),
         BackendKind::Wgpu => {
-            let backends = match job.api {
+            let backends = match api {
                 Api::Vulkan => Backends::VULKAN,
                 Api::Gl => Backends::GL,
             };
@@ -64,7 +84,7 @@ pub(super) fn open(job: &Job) -> Result<Opened, BackendError> {
             })?)
         }
         BackendKind::Ash => {
-            let validation = if job.validate {
+            let validation = if validate {
                 Validation::Synchronization
             } else {
                 Validation::Off
@@ -74,6 +94,5 @@ pub(super) fn open(job: &Job) -> Result<Opened, BackendError> {
                 ..AshOptions::default()
             })?)
         }
-    };
-    Ok(Opened::Device(device))
+    })
 }

@@ -2,7 +2,7 @@
 //! process of its own: the Vulkan loader reads its environment once per
 //! process, and a driver that crashes must not take the comparison with it.
 
-mod backends;
+pub(crate) mod backends;
 mod buffer;
 pub mod frame;
 pub mod outcome;
@@ -19,7 +19,7 @@ use thiserror::Error;
 
 use crate::size::Size;
 use crate::test_backends::model::BackendKind;
-use backends::open;
+use backends::open_for;
 use frame::{Source, SourceError, graph};
 use outcome::{Capture, Label, Outcome, OutcomeError, Run, Time};
 use plant::{Fault, PlantError};
@@ -250,7 +250,7 @@ pub fn run(job: &Job) -> Result<(), OutcomeError> {
 fn execute(job: &Job) -> Result<Run, ExecuteError> {
     let effect = find_effect(&job.effect)?;
     // The device first: without one there is no need to render anything.
-    let mut opened = open(job)?;
+    let mut opened = open_for(job)?;
     let backend = opened.backend();
     let frame = job.source().frame()?;
     let graph = graph(&frame, effect)?;

@@ -6,7 +6,7 @@ mod gallery;
 mod html;
 pub mod model;
 mod options;
-mod supervise;
+pub(crate) mod supervise;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -261,7 +261,7 @@ fn check_planted(options: &Options, executors: &[Executor]) -> Result<(), TestEr
 
 /// Everyone who is to run: the interpreter, then each driver asked for by wgpu
 /// and by ash, then OpenGL.
-fn executors(drivers: &[Driver], asked: &[String]) -> Result<Vec<Executor>, TestError> {
+pub(crate) fn executors(drivers: &[Driver], asked: &[String]) -> Result<Vec<Executor>, TestError> {
     const GL: &str = "gl";
     let is_known = |name: &str| {
         name == "all" || name == GL || drivers.iter().any(|driver| driver.name == name)

@@ -1,5 +1,6 @@
 //! Runs jobs in processes of their own and finds out how they ended.
 
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -29,34 +30,48 @@ pub(super) fn run(
     target: &Target,
     limit: Duration,
 ) -> (Status, Option<Run>) {
-    let crashed = |reason: String| (Status::Crashed { reason }, None);
     let log = job.out.join("stderr.txt");
-    let end = match start_and_wait(program, job, target, limit, &log) {
-        Ok(end) => end,
-        Err(error) => return crashed(format!("{}: {error}", program.display())),
-    };
-    let said = last_words(&log);
-    match end {
-        End::TooLong => crashed(with_words(
-            format!("no end after {} s", limit.as_secs()),
-            &said,
-        )),
-        End::Exited(status) if !status.success() => crashed(with_words(status.to_string(), &said)),
-        End::Exited(_) => match Outcome::read(&job.out) {
-            Ok(Outcome::Ran(run)) => (
-                Status::Ran {
-                    device: run.device.clone(),
-                    times: run.times.clone(),
-                    findings: run.findings.clone(),
-                },
-                Some(run),
-            ),
-            Ok(Outcome::NoDevice { reason }) => (Status::NoDevice { reason }, None),
-            Ok(Outcome::Unsupported { reason }) => (Status::Unsupported { reason }, None),
-            Ok(Outcome::Failed { reason }) => (Status::Failed { reason }, None),
-            Err(error) => crashed(with_words(error.to_string(), &said)),
-        },
+    let crashed = |reason: String| (Status::Crashed { reason }, None);
+    if let Err(reason) = to_the_end(program, COMMAND, &job.arguments(), target, limit, &log) {
+        return crashed(reason);
     }
+    match Outcome::read(&job.out) {
+        Ok(Outcome::Ran(run)) => (
+            Status::Ran {
+                device: run.device.clone(),
+                times: run.times.clone(),
+                findings: run.findings.clone(),
+            },
+            Some(run),
+        ),
+        Ok(Outcome::NoDevice { reason }) => (Status::NoDevice { reason }, None),
+        Ok(Outcome::Unsupported { reason }) => (Status::Unsupported { reason }, None),
+        Ok(Outcome::Failed { reason }) => (Status::Failed { reason }, None),
+        Err(error) => crashed(with_words(error.to_string(), &last_words(&log))),
+    }
+}
+
+/// Runs a hidden command of `program` on a target, its standard error going to
+/// `log`, and waits for it.
+///
+/// # Errors
+/// How it ended, with the last words of the log, if it did not end well within
+/// `limit`.
+pub(crate) fn to_the_end(
+    program: &Path,
+    command: &str,
+    arguments: &[OsString],
+    target: &Target,
+    limit: Duration,
+    log: &Path,
+) -> Result<(), String> {
+    let end = match start_and_wait(program, command, arguments, target, limit, log) {
+        Ok(End::Exited(status)) if status.success() => return Ok(()),
+        Ok(End::Exited(status)) => status.to_string(),
+        Ok(End::TooLong) => format!("no end after {} s", limit.as_secs()),
+        Err(error) => return Err(format!("{}: {error}", program.display())),
+    };
+    Err(with_words(end, &last_words(log)))
 }
 
 /// How a process ended.
@@ -67,15 +82,16 @@ enum End {
 
 fn start_and_wait(
     program: &Path,
-    job: &Job,
+    name: &str,
+    arguments: &[OsString],
     target: &Target,
     limit: Duration,
     log: &Path,
 ) -> io::Result<End> {
     let mut command = Command::new(program);
     command
-        .arg(COMMAND)
-        .args(job.arguments())
+        .arg(name)
+        .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(File::create(log)?);

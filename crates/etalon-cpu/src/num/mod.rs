@@ -160,9 +160,11 @@ pub(crate) trait Number: Lane + Operands {
     fn lt(self, other: Self) -> bool;
     fn le(self, other: Self) -> bool;
 
-    /// Truncates; out of range saturates, NaN gives 0.
+    /// Truncates; out of range gives the nearest value that `f32` has too (WGSL
+    /// §15.7.6), so 2147483520 for all that is greater. NaN gives 0.
     fn to_i32(self) -> i32;
-    /// Truncates; out of range saturates, NaN gives 0.
+    /// Truncates; out of range gives the nearest value that `f32` has too, so
+    /// 4294967040 for all that is greater. NaN gives 0.
     fn to_u32(self) -> u32;
     fn from_i32(value: i32) -> Self;
     fn from_u32(value: u32) -> Self;

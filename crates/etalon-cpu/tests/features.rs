@@ -239,7 +239,6 @@ fn pointers_lead_into_every_address_space() {
         var<workgroup> shared_pair: array<Pair, 64>;
         fn of_private(p: ptr<private, Pair>, i: u32) { (*p).b[i % 3u] = i; (*p).a += 1u; }
         fn of_function(p: ptr<function, array<u32, 4>>, i: u32) { let q = &(*p)[i % 4u]; *q += 5u; }
-        fn of_workgroup(p: ptr<workgroup, Pair>, i: u32) { (*p).a = i * 3u; (*p).b[1] = i; }
         fn increment(p: ptr<function, u32>) { *p += 1u; }
         @compute @workgroup_size(64)
         fn main(@builtin(local_invocation_index) i: u32) {
@@ -248,7 +247,9 @@ fn pointers_lead_into_every_address_space() {
             increment(&local[2]);
             of_private(&own, i);
             of_private(&own, i + 1u);
-            of_workgroup(&shared_pair[i], i);
+            let mine = &shared_pair[i];
+            (*mine).a = i * 3u;
+            (*mine).b[1] = i;
             workgroupBarrier();
             let other = 63u - i;
             let all = &data;

@@ -3,7 +3,7 @@
 
 use etalon_core::resource::AddressMode;
 
-use crate::num::{Number, mask};
+use crate::num::Number;
 
 /// Up to here positions of texels are exact in [`small_int`].
 const MAX_FAST_SIZE: u32 = 1 << 22;
@@ -67,7 +67,7 @@ pub(super) fn unnormalised<const K: usize>(
     let half = if linear { 0.5 } else { 0.0 };
     for k in 0..K {
         let scaled = coordinate[k] * size[k] - half;
-        floors[k] = floor(scaled);
+        floors[k] = Number::floor_in_steps(scaled);
         weight[k] = scaled - floors[k];
     }
     if !linear {
@@ -91,20 +91,6 @@ pub(super) fn wrap(mode: AddressMode, at: i32, size: u32) -> u32 {
     }) as u32
 }
 
-/// What `f32::floor` gives, as vector code on every instruction set: without
-/// an instruction for it, compilers call a function for each lane.
-#[inline(always)]
-fn floor(x: f32) -> f32 {
-    // From here on every number is whole.
-    const WHOLE: f32 = 8_388_608.0;
-    let sign = x.to_bits() & 0x8000_0000;
-    let magnitude = Number::abs(x);
-    let nearest = f32::from_bits(((magnitude + WHOLE) - WHOLE).to_bits() | sign);
-    let above = mask(nearest > x) & 1.0_f32.to_bits();
-    let below = nearest - f32::from_bits(above);
-    Number::select(mask(magnitude < WHOLE), below, x)
-}
-
 /// The integer that a whole number of magnitude up to 2^22 is.
 #[inline(always)]
 fn small_int(x: f32) -> i32 {
@@ -116,36 +102,6 @@ fn small_int(x: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn floors_are_those_of_the_standard_library() {
-        let special = [
-            0.0,
-            -0.0,
-            0.5,
-            -0.5,
-            1.5,
-            2.5,
-            8_388_607.5,
-            -8_388_607.5,
-            8_388_608.0,
-            4_194_303.7,
-            -1.0e-30,
-            f32::from_bits(1),
-            f32::MAX,
-            f32::MIN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-        ];
-        let spread = (0..2_000_000_u32).map(|i| f32::from_bits(i.wrapping_mul(0x9e37_79b1)));
-        for x in special.into_iter().chain(spread) {
-            if x.is_nan() {
-                assert!(floor(x).is_nan());
-            } else {
-                assert_eq!(floor(x).to_bits(), x.floor().to_bits(), "{x}");
-            }
-        }
-    }
 
     #[test]
     fn small_integers_are_exact() {

@@ -33,7 +33,7 @@ pub(super) fn sample<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     if varying {
         Handler::tiered::<Sample<LANES>>(tier)
     } else {
-        Handler::tiered::<Sample<1>>(Tier::Baseline)
+        Handler::portable::<Sample<1>>()
     }
 }
 
@@ -41,7 +41,7 @@ pub(super) fn gather<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
     if varying {
         Handler::tiered::<gather::Gather<LANES>>(tier)
     } else {
-        Handler::tiered::<gather::Gather<1>>(Tier::Baseline)
+        Handler::portable::<gather::Gather<1>>()
     }
 }
 

@@ -265,7 +265,8 @@ impl Checker<'_> {
                     }
                     self.uniforms(step, *slice)?;
                 }
-                (Bound::Sampler(_), BindingKind::Sampler { .. }) => {}
+                (Bound::Sampler(desc), BindingKind::Sampler { comparison })
+                    if desc.compare.is_some() == *comparison && desc.lod.is_valid() => {}
                 _ => return Err(wrong()),
             }
         }

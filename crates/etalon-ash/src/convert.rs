@@ -7,7 +7,9 @@ use etalon_core::Format;
 use etalon_core::format::SampleKind;
 use etalon_core::graph::Subresources;
 use etalon_core::kernel::ViewDimension;
-use etalon_core::resource::{AddressMode, Dimension, Filter, SamplerDesc, TextureDesc};
+use etalon_core::resource::{
+    AddressMode, Compare, Dimension, Filter, LodRange, SamplerDesc, TextureDesc,
+};
 
 /// The Vulkan format, or `None` for one this backend does not know.
 pub(crate) fn format(format: Format) -> Option<vk::Format> {
@@ -132,9 +134,9 @@ pub(crate) const fn whole_view_type(desc: &TextureDesc) -> vk::ImageViewType {
     }
 }
 
-/// A sampler; the level of detail is always explicit, so all mips are allowed.
+/// A sampler; the level of detail is always explicit.
 pub(crate) fn sampler(desc: &SamplerDesc) -> vk::SamplerCreateInfo<'static> {
-    let filter = match desc.filter {
+    let filter = |filter| match filter {
         Filter::Nearest => vk::Filter::NEAREST,
         Filter::Linear => vk::Filter::LINEAR,
     };
@@ -142,19 +144,42 @@ pub(crate) fn sampler(desc: &SamplerDesc) -> vk::SamplerCreateInfo<'static> {
         Filter::Nearest => vk::SamplerMipmapMode::NEAREST,
         Filter::Linear => vk::SamplerMipmapMode::LINEAR,
     };
-    let address = match desc.address {
+    let [u, v, w] = desc.address.map(|address| match address {
         AddressMode::ClampToEdge => vk::SamplerAddressMode::CLAMP_TO_EDGE,
         AddressMode::Repeat => vk::SamplerAddressMode::REPEAT,
         AddressMode::MirrorRepeat => vk::SamplerAddressMode::MIRRORED_REPEAT,
+    });
+    let max_lod = if desc.lod.max == LodRange::ALL.max {
+        vk::LOD_CLAMP_NONE
+    } else {
+        desc.lod.max_level()
     };
-    vk::SamplerCreateInfo::default()
-        .mag_filter(filter)
-        .min_filter(filter)
+    let info = vk::SamplerCreateInfo::default()
+        .mag_filter(filter(desc.mag_filter))
+        .min_filter(filter(desc.min_filter))
         .mipmap_mode(mipmap)
-        .address_mode_u(address)
-        .address_mode_v(address)
-        .address_mode_w(address)
-        .max_lod(vk::LOD_CLAMP_NONE)
+        .address_mode_u(u)
+        .address_mode_v(v)
+        .address_mode_w(w)
+        .min_lod(desc.lod.min_level())
+        .max_lod(max_lod);
+    match desc.compare {
+        Some(compare) => info.compare_enable(true).compare_op(compare_op(compare)),
+        None => info,
+    }
+}
+
+const fn compare_op(compare: Compare) -> vk::CompareOp {
+    match compare {
+        Compare::Never => vk::CompareOp::NEVER,
+        Compare::Less => vk::CompareOp::LESS,
+        Compare::Equal => vk::CompareOp::EQUAL,
+        Compare::LessEqual => vk::CompareOp::LESS_OR_EQUAL,
+        Compare::Greater => vk::CompareOp::GREATER,
+        Compare::NotEqual => vk::CompareOp::NOT_EQUAL,
+        Compare::GreaterEqual => vk::CompareOp::GREATER_OR_EQUAL,
+        Compare::Always => vk::CompareOp::ALWAYS,
+    }
 }
 
 /// A texture in words, for errors.

@@ -292,7 +292,7 @@ pub(crate) struct Sampler {
 
 impl Sampler {
     pub(crate) fn new(device: &Arc<Device>, desc: &SamplerDesc) -> Result<Arc<Self>, BackendError> {
-        // SAFETY: the description uses no feature, and no anisotropy or comparison.
+        // SAFETY: the description uses no feature and no anisotropy.
         let raw = unsafe { device.raw.create_sampler(&convert::sampler(desc), None) }
             .map_err(failed("vkCreateSampler"))?;
         Ok(Arc::new(Self {

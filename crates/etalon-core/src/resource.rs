@@ -6,6 +6,10 @@ use thiserror::Error;
 
 use crate::Format;
 
+mod sampler;
+
+pub use sampler::{AddressMode, Compare, Filter, LodRange, SamplerDesc};
+
 /// The most layers a texture may have, whatever the device says: no device
 /// offers more, and planning follows every layer of every mip.
 pub const MAX_LAYERS: u32 = 4096;
@@ -339,48 +343,6 @@ impl BufferDesc {
         }
         Ok(())
     }
-}
-
-/// What happens to coordinates outside the texture.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum AddressMode {
-    /// The edge texel is repeated.
-    #[default]
-    ClampToEdge,
-    /// The texture is repeated.
-    Repeat,
-    /// The texture is repeated, mirrored every other time.
-    MirrorRepeat,
-}
-
-/// How texels are combined.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub enum Filter {
-    /// The nearest one.
-    #[default]
-    Nearest,
-    /// Weighted by distance.
-    Linear,
-}
-
-/// A sampler. The level of detail is always explicit in Etalon's kernels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-pub struct SamplerDesc {
-    /// Addressing in u, v, w.
-    pub address: AddressMode,
-    /// Within a mip level.
-    pub filter: Filter,
-    /// Between mip levels.
-    pub mip_filter: Filter,
-}
-
-impl SamplerDesc {
-    /// Linear within and between mips, clamped to the edge.
-    pub const LINEAR_CLAMP: Self = Self {
-        address: AddressMode::ClampToEdge,
-        filter: Filter::Linear,
-        mip_filter: Filter::Linear,
-    };
 }
 
 /// What a device can do, as far as planning must know.

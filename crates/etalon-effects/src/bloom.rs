@@ -71,11 +71,8 @@ impl Bloom {
 }
 
 /// What fast kernels filter with; strict ones do it themselves.
-pub(crate) const LINEAR: SamplerDesc = SamplerDesc {
-    address: AddressMode::ClampToEdge,
-    filter: Filter::Linear,
-    mip_filter: Filter::Nearest,
-};
+pub(crate) const LINEAR: SamplerDesc =
+    SamplerDesc::new(AddressMode::ClampToEdge, Filter::Linear, Filter::Nearest);
 
 /// The bloom of `colour`, exposed.
 ///

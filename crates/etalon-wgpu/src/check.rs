@@ -304,7 +304,11 @@ impl Checker<'_> {
             (BindingKind::Uniform(layout), Bound::Uniform(slice)) if layout.size == slice.size => {
                 self.uniform(*slice)
             }
-            (BindingKind::Sampler { comparison: false }, Bound::Sampler(_)) => Ok(()),
+            (BindingKind::Sampler { comparison }, Bound::Sampler(desc))
+                if *comparison == desc.compare.is_some() && desc.lod.is_valid() =>
+            {
+                Ok(())
+            }
             _ => Err(self.malformed(format_args!("`{name}` is given something else"))),
         }
     }

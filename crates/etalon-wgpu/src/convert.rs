@@ -4,7 +4,7 @@ use etalon_core::Format;
 use etalon_core::graph::Subresources;
 use etalon_core::kernel::{Access, ViewDimension};
 use etalon_core::plan::{Usage, UsageSet};
-use etalon_core::resource::{AddressMode, Dimension, Filter, SamplerDesc, TextureDesc};
+use etalon_core::resource::{AddressMode, Compare, Dimension, Filter, SamplerDesc, TextureDesc};
 
 /// wgpu's name of a format, if it has one.
 pub(crate) const fn format(format: Format) -> Option<wgpu::TextureFormat> {
@@ -159,26 +159,42 @@ pub(crate) const fn storage_access(access: Access) -> wgpu::StorageTextureAccess
 
 /// A sampler. Without mip filtering the nearest mip is taken.
 pub(crate) fn sampler(desc: &SamplerDesc) -> wgpu::SamplerDescriptor<'static> {
-    let address = match desc.address {
+    let [u, v, w] = desc.address.map(|address| match address {
         AddressMode::ClampToEdge => wgpu::AddressMode::ClampToEdge,
         AddressMode::Repeat => wgpu::AddressMode::Repeat,
         AddressMode::MirrorRepeat => wgpu::AddressMode::MirrorRepeat,
-    };
-    let filter = match desc.filter {
+    });
+    let filter = |filter| match filter {
         Filter::Nearest => wgpu::FilterMode::Nearest,
         Filter::Linear => wgpu::FilterMode::Linear,
     };
     wgpu::SamplerDescriptor {
         label: Some("etalon sampler"),
-        address_mode_u: address,
-        address_mode_v: address,
-        address_mode_w: address,
-        mag_filter: filter,
-        min_filter: filter,
+        address_mode_u: u,
+        address_mode_v: v,
+        address_mode_w: w,
+        mag_filter: filter(desc.mag_filter),
+        min_filter: filter(desc.min_filter),
         mipmap_filter: match desc.mip_filter {
             Filter::Nearest => wgpu::MipmapFilterMode::Nearest,
             Filter::Linear => wgpu::MipmapFilterMode::Linear,
         },
+        lod_min_clamp: desc.lod.min_level(),
+        lod_max_clamp: desc.lod.max_level(),
+        compare: desc.compare.map(compare),
         ..wgpu::SamplerDescriptor::default()
+    }
+}
+
+const fn compare(compare: Compare) -> wgpu::CompareFunction {
+    match compare {
+        Compare::Never => wgpu::CompareFunction::Never,
+        Compare::Less => wgpu::CompareFunction::Less,
+        Compare::Equal => wgpu::CompareFunction::Equal,
+        Compare::LessEqual => wgpu::CompareFunction::LessEqual,
+        Compare::Greater => wgpu::CompareFunction::Greater,
+        Compare::NotEqual => wgpu::CompareFunction::NotEqual,
+        Compare::GreaterEqual => wgpu::CompareFunction::GreaterEqual,
+        Compare::Always => wgpu::CompareFunction::Always,
     }
 }

@@ -235,11 +235,25 @@ impl Binder<'_> {
                 BindingKind::Sampler { comparison } => {
                     let given = samplers.iter().find(|(candidate, _)| candidate == name);
                     let (_, sampler) = given.ok_or_else(|| self.missing("sampler", name))?;
-                    if *comparison {
+                    let kind = |comparison| {
+                        if comparison {
+                            "a comparison sampler"
+                        } else {
+                            "a filtering sampler"
+                        }
+                    };
+                    if sampler.compare.is_some() != *comparison {
                         return Err(self.differs(
                             name,
-                            "a filtering sampler",
-                            "a comparison sampler",
+                            kind(sampler.compare.is_some()),
+                            kind(*comparison),
+                        ));
+                    }
+                    if !sampler.lod.is_valid() {
+                        return Err(self.differs(
+                            name,
+                            format!("a sampler of the levels {}", sampler.lod),
+                            "one whose least level is not above the greatest",
                         ));
                     }
                     Bound::Sampler(*sampler)

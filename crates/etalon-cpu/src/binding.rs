@@ -54,12 +54,17 @@ pub enum BindingKind {
         writable: bool,
     },
     /// A sampler.
-    Sampler,
+    Sampler {
+        /// Whether it compares depth.
+        comparison: bool,
+    },
 }
 
 /// How a texture is addressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum View {
+    /// One dimension: a two-dimensional texture of height 1.
+    D1,
     /// Two dimensions.
     D2,
     /// Two dimensions and a layer.
@@ -95,6 +100,10 @@ impl BindingInfo {
     }
 }
 
+/// What textures of several samples are called in errors.
+pub(crate) const MULTISAMPLED: &str =
+    "multisampled textures: the textures of an effect have one sample per texel";
+
 /// The layout of a resource variable.
 pub(crate) fn describe_binding(
     module: &Module,
@@ -119,10 +128,7 @@ pub(crate) fn describe_binding(
             min_size: ty.size(module.to_ctx()),
             writable: access.contains(StorageAccess::STORE),
         },
-        (_, TypeInner::Sampler { comparison: false }) => BindingKind::Sampler,
-        (_, TypeInner::Sampler { comparison: true }) => {
-            return Err(Fail::unsupported("comparison samplers"));
-        }
+        (_, &TypeInner::Sampler { comparison }) => BindingKind::Sampler { comparison },
         (
             _,
             &TypeInner::Image {
@@ -137,13 +143,11 @@ pub(crate) fn describe_binding(
                 (ImageDimension::D3, _) => View::D3,
                 (ImageDimension::Cube, false) => View::Cube,
                 (ImageDimension::Cube, true) => View::CubeArray,
-                (ImageDimension::D1, _) => {
-                    return Err(Fail::unsupported("one-dimensional textures"));
-                }
+                (ImageDimension::D1, _) => View::D1,
             };
             match class {
                 ImageClass::Sampled { multi: true, .. } | ImageClass::Depth { multi: true } => {
-                    return Err(Fail::unsupported("multisampled textures"));
+                    return Err(Fail::unsupported(MULTISAMPLED));
                 }
                 ImageClass::Sampled { kind, .. } => BindingKind::Texture {
                     view,
@@ -158,17 +162,18 @@ pub(crate) fn describe_binding(
                     kind: ChannelKind::Float,
                 },
                 ImageClass::External => return Err(Fail::unsupported("external textures")),
-                ImageClass::Storage { format, access } => {
-                    if access.contains(StorageAccess::ATOMIC) {
-                        return Err(Fail::unsupported("atomic operations on textures"));
-                    }
-                    BindingKind::StorageTexture {
-                        view,
-                        format: storage_format(format)?,
-                        writable: access.contains(StorageAccess::STORE),
-                    }
-                }
+                ImageClass::Storage { format, access } => BindingKind::StorageTexture {
+                    view,
+                    format: storage_format(format)?,
+                    writable: access.contains(StorageAccess::STORE),
+                },
             }
+        }
+        (_, TypeInner::AccelerationStructure { .. }) => {
+            return Err(Fail::unsupported("ray queries"));
+        }
+        (_, TypeInner::BindingArray { .. }) => {
+            return Err(Fail::unsupported("arrays of resources"));
         }
         _ => return Err(Fail::unsupported(format!("resources like `{name}`"))),
     };

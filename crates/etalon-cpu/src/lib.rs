@@ -10,7 +10,8 @@
 //! Arithmetic is IEEE 754 binary32 without fused operations and with
 //! subnormals, so results of `+ - * / sqrt` and of what is made from them are
 //! exactly those of strict devices. They do not depend on the instruction set
-//! or the number of threads, save for the payload of NaNs.
+//! or the number of threads, save for the payload of NaNs. [`semantics`] says
+//! operation by operation what is computed.
 
 #![deny(unsafe_code)]
 
@@ -25,6 +26,7 @@ mod memory;
 mod num;
 mod program;
 mod registers;
+pub mod semantics;
 mod translate;
 
 pub use backend::{CpuBackend, CpuOptions};

@@ -4,7 +4,7 @@ use std::fmt;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use etalon_core::kernel::Kernel;
-use etalon_core::resource::{Dimension, SamplerDesc};
+use etalon_core::resource::{Dimension, SamplerDesc, TextureDesc};
 use naga::valid::ModuleInfo;
 use naga::{Module, ShaderStage, Span};
 
@@ -23,6 +23,7 @@ pub struct Program {
     name: String,
     workgroup_size: [u32; 3],
     bindings: Vec<BindingInfo>,
+    immediates: Option<u32>,
     code: Code,
     local_ids: exec::LocalIds,
     linked: [OnceLock<Linked<f32>>; Tier::ALL.len()],
@@ -139,6 +140,14 @@ impl Program {
                 limit,
             },
         };
+        let overridden = module.entry_points[index]
+            .workgroup_size_overrides
+            .and_then(|sizes| sizes.into_iter().flatten().next());
+        if let Some(expression) = overridden {
+            let fail = Fail::invalid("the workgroup size is an override that was not resolved");
+            let span = module.global_expressions.get_span(expression);
+            return Err(explain((fail, span)));
+        }
         let invocations = workgroup_size
             .iter()
             .try_fold(1_u32, |total, &size| total.checked_mul(size))
@@ -163,6 +172,7 @@ impl Program {
             name,
             workgroup_size,
             bindings: translation.bindings,
+            immediates: translation.immediates,
             code,
             local_ids: exec::LocalIds::new(workgroup_size),
             linked: Default::default(),
@@ -189,8 +199,15 @@ impl Program {
         self.workgroup_size
     }
 
+    /// Bytes of the kernel's `var<immediate>`, 0 without one.
+    #[must_use]
+    pub fn immediate_size(&self) -> u32 {
+        self.immediates.unwrap_or(0)
+    }
+
     /// Runs a number of workgroups along each axis and waits for them.
-    /// `resources` are in the order of [`Program::bindings`].
+    /// `resources` are in the order of [`Program::bindings`]. For kernels that
+    /// have no immediate data.
     ///
     /// # Errors
     /// [`RunError::Binding`] if resources are missing or of the wrong kind; the
@@ -202,10 +219,38 @@ impl Program {
         workgroups: [u32; 3],
         resources: &[BoundResource<'_>],
     ) -> Result<DispatchCounters, RunError> {
-        let mut bound = Vec::with_capacity(self.bindings.len());
+        self.dispatch_with_immediates(executor, workgroups, resources, &[])
+    }
+
+    /// Like [`Program::dispatch`], for kernels with a `var<immediate>`: its
+    /// bytes, laid out as in a storage buffer, of which there must be at least
+    /// [`Program::immediate_size`].
+    ///
+    /// # Errors
+    /// As [`Program::dispatch`]; [`RunError::Binding`] if bytes are missing.
+    pub fn dispatch_with_immediates(
+        &self,
+        executor: &Executor,
+        workgroups: [u32; 3],
+        resources: &[BoundResource<'_>],
+        immediates: &[u8],
+    ) -> Result<DispatchCounters, RunError> {
+        let need = self.immediate_size();
+        if immediates.len() < need as usize {
+            return Err(RunError::Binding {
+                kernel: self.name.clone(),
+                binding: "var<immediate>".to_owned(),
+                expected: format!("{need} bytes"),
+                found: format!("immediate data of {} bytes", immediates.len()),
+            });
+        }
+        let immediates = Buffer::from_bytes(&immediates[..need as usize])?;
+        let mut bound = Vec::with_capacity(self.bindings.len() + 1);
         for (i, binding) in self.bindings.iter().enumerate() {
             bound.push(self.check(binding, resources.get(i))?);
         }
+        // Where translation has put it.
+        bound.push(Resource::Buffer(immediates.words(), immediates.len()));
         let tier = executor.tier();
         let linked = self.linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier));
         let invocations = self.workgroup_size.iter().product();
@@ -299,10 +344,10 @@ impl Program {
                     etalon_core::format::SampleKind::Uint => ChannelKind::Uint,
                     _ => ChannelKind::Float,
                 };
-                if !fits(view, desc.dimension) || found != kind {
+                if !fits(view, &desc) || found != kind {
                     return Err(mismatch(
                         format!("a {view:?} texture of kind {kind:?}"),
-                        format!("a {:?} texture of format {}", desc.dimension, desc.format),
+                        describe(&desc),
                     ));
                 }
                 Ok(Resource::Texture(texture))
@@ -312,22 +357,41 @@ impl Program {
                 Some(BoundResource::Texture(texture)),
             ) => {
                 let desc = texture.desc();
-                if !fits(view, desc.dimension) || desc.format != format {
+                if !fits(view, &desc) || desc.format != format {
                     return Err(mismatch(
                         format!("a {view:?} texture of format {format}"),
-                        format!("a {:?} texture of format {}", desc.dimension, desc.format),
+                        describe(&desc),
                     ));
                 }
                 Ok(Resource::Texture(texture))
             }
-            (BindingKind::Sampler, Some(BoundResource::Sampler(sampler))) => {
+            (BindingKind::Sampler { comparison }, Some(BoundResource::Sampler(sampler))) => {
+                let kind = |comparison| {
+                    if comparison {
+                        "a comparison sampler"
+                    } else {
+                        "a filtering sampler"
+                    }
+                };
+                if sampler.compare.is_some() != comparison {
+                    return Err(mismatch(
+                        kind(comparison).to_owned(),
+                        kind(!comparison).to_owned(),
+                    ));
+                }
+                if !sampler.lod.is_valid() {
+                    return Err(mismatch(
+                        "a sampler whose least level is not above the greatest".to_owned(),
+                        format!("one of the levels {}", sampler.lod),
+                    ));
+                }
                 Ok(Resource::Sampler(*sampler))
             }
             (kind, found) => {
                 let expected = match kind {
                     BindingKind::Uniform { .. } | BindingKind::Storage { .. } => "a buffer",
                     BindingKind::Texture { .. } | BindingKind::StorageTexture { .. } => "a texture",
-                    BindingKind::Sampler => "a sampler",
+                    BindingKind::Sampler { .. } => "a sampler",
                 };
                 let found = match found {
                     None => "nothing",
@@ -344,13 +408,24 @@ impl Program {
 /// Most invocations of a workgroup.
 const MAX_INVOCATIONS: u32 = 1024;
 
-fn fits(view: View, dimension: Dimension) -> bool {
+fn fits(view: View, desc: &TextureDesc) -> bool {
     match view {
+        View::D1 => {
+            desc.dimension == Dimension::D2 && desc.extent.height == 1 && desc.layers() == 1
+        }
         // The faces of a cube can be read and written as layers.
-        View::D2 | View::D2Array => dimension != Dimension::D3,
-        View::D3 => dimension == Dimension::D3,
-        View::Cube | View::CubeArray => dimension == Dimension::Cube,
+        View::D2 | View::D2Array => desc.dimension != Dimension::D3,
+        View::D3 => desc.dimension == Dimension::D3,
+        View::Cube | View::CubeArray => desc.dimension == Dimension::Cube,
     }
+}
+
+fn describe(desc: &TextureDesc) -> String {
+    let extent = desc.extent;
+    format!(
+        "a {:?} texture of {}×{}×{} and format {}",
+        desc.dimension, extent.width, extent.height, extent.depth_or_layers, desc.format
+    )
 }
 
 impl fmt::Display for Program {

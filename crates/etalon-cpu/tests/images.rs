@@ -322,7 +322,7 @@ fn filtered(image: &ImageData, mip: u32, sampler: SamplerDesc, u: f32, v: f32) -
     let extent = image.desc.mip_extent(mip);
     let address = |at: i64, size: u32| {
         let size = i64::from(size);
-        (match sampler.address {
+        (match sampler.address[0] {
             AddressMode::ClampToEdge => at.clamp(0, size - 1),
             AddressMode::Repeat => at.rem_euclid(size),
             AddressMode::MirrorRepeat => {
@@ -339,7 +339,7 @@ fn filtered(image: &ImageData, mip: u32, sampler: SamplerDesc, u: f32, v: f32) -
     };
     // As the texel is chosen in f32, so is it here.
     let (x, y) = (u * extent.width as f32, v * extent.height as f32);
-    match sampler.filter {
+    match sampler.mag_filter {
         Filter::Nearest => texel(x.floor() as i64, y.floor() as i64),
         Filter::Linear => {
             let (x, y) = (x - 0.5, y - 0.5);
@@ -392,11 +392,7 @@ fn samples_are_filtered_addressed_and_mipped() {
     ] {
         for filter in [Filter::Nearest, Filter::Linear] {
             for mip_filter in [Filter::Nearest, Filter::Linear] {
-                let sampler = SamplerDesc {
-                    address,
-                    filter,
-                    mip_filter,
-                };
+                let sampler = SamplerDesc::new(address, filter, mip_filter);
                 let mut first: Option<Vec<u32>> = None;
                 for (name, executor) in executors() {
                     let result = buffer(&vec![0; count as usize]);

@@ -7,29 +7,8 @@ use etalon_cpu::{Executor, Program, TranslateError};
 
 #[test]
 fn unsupported_constructs_are_named_and_placed() {
-    let texture =
-        "@group(0) @binding(0) var t: texture_2d<f32>; @group(0) @binding(1) var s: sampler;";
     let main = "@compute @workgroup_size(1) fn main() {\n  ";
     let cases = [
-        (
-            format!("{texture}\n{main}_ = textureGather(0, t, s, vec2<f32>(0.5));\n}}"),
-            "textureGather",
-            3,
-        ),
-        (
-            format!(
-                "{texture}\n{main}_ = textureSampleGrad(t, s, vec2<f32>(0.5), vec2<f32>(0.1), vec2<f32>(0.1));\n}}"
-            ),
-            "textureSampleGrad",
-            3,
-        ),
-        (
-            format!(
-                "{texture}\n{main}_ = textureSampleLevel(t, s, vec2<f32>(0.5), 0.0, vec2<i32>(1, 0));\n}}"
-            ),
-            "offset",
-            3,
-        ),
         (
             format!("var<private> a: f64;\n{main}a = 1.0lf;\n}}"),
             "64-bit",
@@ -44,9 +23,43 @@ fn unsupported_constructs_are_named_and_placed() {
         ),
         (
             format!(
-                "@group(0) @binding(0) var t: texture_depth_2d; @group(0) @binding(1)\nvar s: sampler_comparison;\n{main}_ = textureSampleCompareLevel(t, s, vec2<f32>(0.5), 0.5);\n}}"
+                "@group(0) @binding(0) var t: texture_depth_multisampled_2d;\n{main}_ = textureNumSamples(t);\n}}"
             ),
-            "comparison",
+            "multisampled",
+            1,
+        ),
+        (
+            format!(
+                "@group(0) @binding(0)\nvar t: texture_external;\n{main}_ = textureDimensions(t);\n}}"
+            ),
+            "external",
+            2,
+        ),
+        (
+            format!("{main}let a = 5li;\n  _ = a * 3li;\n}}"),
+            "64-bit",
+            3,
+        ),
+        (format!("{main}var a = 5lu;\n}}"), "64-bit", 2),
+        (
+            format!(
+                "enable wgpu_ray_query;\n@group(0) @binding(0) var scene: acceleration_structure;\n{main}var q: ray_query;\n  rayQueryInitialize(&q, scene, RayDesc(0u, 0xffu, 0.0, 1.0, vec3(0.0), vec3(1.0)));\n}}"
+            ),
+            "ray",
+            2,
+        ),
+        (
+            format!(
+                "@group(0) @binding(0)\nvar t: texture_storage_2d<r64uint, atomic>;\n{main}textureAtomicMax(t, vec2(0, 0), 1lu);\n}}"
+            ),
+            "R64Uint",
+            2,
+        ),
+        (
+            format!(
+                "@group(0) @binding(0)\nvar t: texture_storage_2d<r16unorm, write>;\n{main}textureStore(t, vec2(0, 0), vec4(1.0));\n}}"
+            ),
+            "R16Unorm",
             2,
         ),
     ];
@@ -61,6 +74,46 @@ fn unsupported_constructs_are_named_and_placed() {
                 assert!(location.column > 0);
             }
             other => panic!("{construct}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn overrides_must_be_resolved() {
+    for wgsl in [
+        "override n: u32;\n@group(0) @binding(0) var<storage, read_write> r: array<u32>;\n@compute @workgroup_size(1) fn main() { r[0] = n; }",
+        "override n: u32 = 4;\n@compute @workgroup_size(n) fn main() {}",
+        "override n: u32 = 4;\nvar<workgroup> a: array<u32, n>;\n@compute @workgroup_size(1) fn main() { a[0] = 1u; }",
+    ] {
+        match translate(wgsl) {
+            Err(TranslateError::Invalid { what, location }) => {
+                assert!(what.contains("override"), "{what}");
+                assert!(location.line > 0, "{wgsl}: {location}");
+            }
+            other => panic!("{wgsl}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn texel_offsets_are_in_range() {
+    let wgsl = |offset: &str| {
+        format!(
+            "@group(0) @binding(0) var t: texture_2d<f32>; @group(0) @binding(1) var s: sampler;
+             @group(0) @binding(2) var<storage, read_write> r: array<f32>;
+             @compute @workgroup_size(1) fn main() {{
+               r[0] = textureSampleLevel(t, s, vec2(0.5), 0.0, {offset}).x;
+             }}"
+        )
+    };
+    translate(&wgsl("vec2(-8, 7)")).unwrap();
+    for offset in ["vec2(8, 0)", "vec2(0, -9)"] {
+        match translate(&wgsl(offset)) {
+            Err(TranslateError::Invalid { what, location }) => {
+                assert!(what.contains("-8 to 7"), "{what}");
+                assert_eq!(location.line, 4);
+            }
+            other => panic!("{offset}: {other:?}"),
         }
     }
 }

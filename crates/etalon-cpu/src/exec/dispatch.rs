@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use super::link::Linked;
 use super::profile::{Recorder, Recording, Unwatched, Watch};
 use super::state::{Failure, LocalIds, Resource, State};
+use super::subgroup::MAX_SUBGROUP;
 use super::tier::Tier;
 use crate::code::Code;
 use crate::error::RunError;
@@ -22,6 +23,7 @@ pub struct Executor {
     batch: u32,
     max_trips: u32,
     profile: bool,
+    subgroup_size: u32,
 }
 
 /// What a dispatch did.
@@ -43,6 +45,9 @@ impl Executor {
     /// still fit a core's nearest cache.
     pub const DEFAULT_LANES: u32 = 128;
 
+    /// Default for [`Executor::with_subgroup_size`].
+    pub const DEFAULT_SUBGROUP_SIZE: u32 = 32;
+
     /// An executor with a number of threads; 0 for one per processor.
     ///
     /// # Errors
@@ -61,6 +66,7 @@ impl Executor {
             batch: Self::DEFAULT_LANES,
             max_trips: Self::DEFAULT_MAX_TRIPS,
             profile: false,
+            subgroup_size: Self::DEFAULT_SUBGROUP_SIZE,
         })
     }
 
@@ -101,6 +107,20 @@ impl Executor {
     #[must_use]
     pub fn profiles(&self) -> bool {
         self.profile
+    }
+
+    /// Invocations in a subgroup: consecutive ones by `local_invocation_index`.
+    /// Rounded up to a power of two from 4 to 128, the sizes that WGSL knows.
+    #[must_use]
+    pub fn with_subgroup_size(mut self, size: u32) -> Self {
+        self.subgroup_size = size.clamp(4, MAX_SUBGROUP as u32).next_power_of_two();
+        self
+    }
+
+    /// Invocations in a subgroup.
+    #[must_use]
+    pub fn subgroup_size(&self) -> u32 {
+        self.subgroup_size
     }
 
     /// The instruction set in use.
@@ -253,7 +273,7 @@ impl<N: Number> Job<'_, N> {
             }
             let state = match &mut state {
                 Some(state) => state,
-                empty => empty.insert(self.state(most, workgroups)?),
+                empty => empty.insert(self.state(executor, most, workgroups)?),
             };
             let end = (first + share).min(total);
             let mut index = first;
@@ -282,7 +302,12 @@ impl<N: Number> Job<'_, N> {
         }
     }
 
-    fn state(&self, chunks: usize, workgroups: [u32; 3]) -> Result<State<'_, N>, DispatchFailure> {
+    fn state(
+        &self,
+        executor: &Executor,
+        chunks: usize,
+        workgroups: [u32; 3],
+    ) -> Result<State<'_, N>, DispatchFailure> {
         let [vf, vi, uf, ui] = self.code.files.map(|size| size as usize);
         let stride = vf.max(vi);
         let resources = &self.code.resources;
@@ -310,6 +335,7 @@ impl<N: Number> Job<'_, N> {
             workgroup: [0; 3],
             workgroups,
             any: false,
+            subgroup_size: executor.subgroup_size,
             failure: None,
             trips: vec![0; self.code.loops.len()],
         };

@@ -1,7 +1,5 @@
 //! Handlers of texel loads and stores, and of texture queries.
 
-use std::sync::atomic::Ordering;
-
 use super::isa::Isa;
 use super::link::Instr;
 use super::memory::rounds;
@@ -10,7 +8,7 @@ use super::texels::{OUTSIDE, fetch, put};
 use super::tier::{Handler, Step, Tier, TieredStep};
 use crate::code::{CodeInst, Slot};
 use crate::ir::{ImageAccess, ImageQuery, Op};
-use crate::memory::{Level, Texels, TextureView};
+use crate::memory::{Level, TextureView};
 use crate::num::{Number, mask};
 use crate::registers::LANES;
 
@@ -80,7 +78,7 @@ fn locate<const K: usize>(
 
 /// The indices of the texels that an instruction's operands name.
 #[inline(always)]
-fn addresses<N: Number, const K: usize>(
+pub(super) fn addresses<N: Number, const K: usize>(
     state: &State<'_, N>,
     texture: &TextureView<'_>,
     access: ImageAccess,
@@ -120,52 +118,6 @@ fn addresses<N: Number, const K: usize>(
         }
     }
     out
-}
-
-/// The words of texels; zero outside.
-#[inline(always)]
-pub(super) fn gather<const K: usize>(texels: &Texels, index: &[u32; K], words: &mut [[u64; K]; 2]) {
-    let low = &mut words[0];
-    match texels {
-        Texels::B1(texels) => {
-            for k in 0..K {
-                low[k] = texels
-                    .get(index[k] as usize)
-                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
-            }
-        }
-        Texels::B2(texels) => {
-            for k in 0..K {
-                low[k] = texels
-                    .get(index[k] as usize)
-                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
-            }
-        }
-        Texels::B4(texels) => {
-            for k in 0..K {
-                low[k] = texels
-                    .get(index[k] as usize)
-                    .map_or(0, |texel| texel.load(Ordering::Relaxed).into());
-            }
-        }
-        Texels::B8(texels) => {
-            for k in 0..K {
-                low[k] = texels
-                    .get(index[k] as usize)
-                    .map_or(0, |texel| texel.load(Ordering::Relaxed));
-            }
-        }
-        Texels::B16(texels) => {
-            let [low, high] = words;
-            for k in 0..K {
-                let at = index[k] as usize * 2;
-                (low[k], high[k]) = match texels.get(at..at + 2) {
-                    Some([l, h]) => (l.load(Ordering::Relaxed), h.load(Ordering::Relaxed)),
-                    _ => (0, 0),
-                };
-            }
-        }
-    }
 }
 
 #[inline(always)]

@@ -5,7 +5,7 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{image, memory, sample};
+use super::{half, image, memory, sample, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::Op;
 use crate::num::Number;
@@ -156,6 +156,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::Table { .. } => memory::table(tier, varying_result),
         Op::BufferLoad { .. } => memory::buffer_load(tier, varying_result),
         Op::BufferStore { .. } => Handler::plain::<memory::BufferStore>(),
+        Op::BufferStoreHalf { .. } => Handler::plain::<half::BufferStoreHalf>(),
         Op::BufferLength { .. } => Handler::plain::<memory::BufferLength>(),
         Op::BufferAtomic { .. } => Handler::plain::<memory::BufferAtomic>(),
         Op::MemoryLoad { .. } => memory::memory_load(tier, varying_result),
@@ -164,7 +165,10 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::ImageLoad { .. } => image::load(tier, varying_result),
         Op::ImageStore { .. } => Handler::tiered::<image::Store>(tier),
         Op::ImageSample { .. } => sample::sample(tier, varying_result),
+        Op::ImageGather { .. } => sample::gather(tier, varying_result),
+        Op::ImageAtomic { .. } => Handler::plain::<texel_atomic::ImageAtomic>(),
         Op::ImageQuery { .. } => image::query(tier, varying_result),
+        Op::Subgroup { .. } => Handler::plain::<subgroup::Subgroup>(),
         Op::Barrier => Handler::plain::<Barrier>(),
     }
 }

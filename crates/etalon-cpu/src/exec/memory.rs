@@ -42,6 +42,7 @@ impl<N: Number> Step<N> for InputStep {
             Input::ActiveLanes => &state.local_ids.active,
             Input::WorkgroupId(a) => return state.set_ints(to, 0, &[state.workgroup[axis(a)]]),
             Input::NumWorkgroups(a) => return state.set_ints(to, 0, &[state.workgroups[axis(a)]]),
+            Input::SubgroupSize => return state.set_ints(to, 0, &[state.subgroup_size]),
         };
         for chunk in 0..state.chunks {
             let lanes = lanes[state.local_chunk(chunk)].0;
@@ -88,7 +89,7 @@ impl<N: Number, const K: usize> Step<N> for Table<K> {
     }
 }
 
-fn words<'a, N>(state: &State<'a, N>, buffer: u16) -> (&'a [AtomicU32], u64) {
+pub(super) fn words<'a, N>(state: &State<'a, N>, buffer: u16) -> (&'a [AtomicU32], u64) {
     match state.resources.get(usize::from(buffer)) {
         Some(&Resource::Buffer(words, bytes)) => (words, bytes),
         _ => (&[], 0),
@@ -97,7 +98,7 @@ fn words<'a, N>(state: &State<'a, N>, buffer: u16) -> (&'a [AtomicU32], u64) {
 
 /// The words' indices: a fixed part, and a computed one if there is an operand.
 #[inline(always)]
-fn indices<N: Number, const K: usize>(
+pub(super) fn indices<N: Number, const K: usize>(
     state: &State<'_, N>,
     offset: u32,
     computed: Option<&Slot>,
@@ -266,7 +267,7 @@ fn fetch(word: &AtomicU32, function: AtomicFunction, first: u32, second: u32) ->
 }
 
 /// The new value; `first` is the expected one of a comparison.
-fn combine(function: AtomicFunction, old: u32, first: u32, second: u32) -> u32 {
+pub(super) fn combine(function: AtomicFunction, old: u32, first: u32, second: u32) -> u32 {
     match function {
         AtomicFunction::Add => old.wrapping_add(first),
         AtomicFunction::Sub => old.wrapping_sub(first),

@@ -10,6 +10,7 @@
 
 mod arith;
 mod dispatch;
+mod half;
 mod image;
 #[allow(unsafe_code)]
 mod isa;
@@ -20,6 +21,8 @@ mod memory;
 mod profile;
 mod sample;
 mod state;
+mod subgroup;
+mod texel_atomic;
 #[allow(unsafe_code)]
 mod texels;
 #[allow(unsafe_code)]

@@ -83,6 +83,8 @@ pub(crate) struct State<'a, N> {
     pub(crate) workgroups: [u32; 3],
     /// What [`super::link`]'s test of a mask found.
     pub(crate) any: bool,
+    /// Invocations of a subgroup.
+    pub(crate) subgroup_size: u32,
     pub(crate) failure: Option<Failure>,
     /// Trips of each loop since it was entered.
     pub(crate) trips: Vec<u32>,

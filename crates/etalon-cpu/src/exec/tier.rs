@@ -126,6 +126,11 @@ impl<N: Number> Handler<N> {
         })
     }
 
+    /// A step that is told the instruction set, for the baseline only.
+    pub(super) fn portable<S: TieredStep<N>>() -> Self {
+        Self(S::run::<isa::Portable>)
+    }
+
     /// The step for the baseline.
     pub(super) fn plain<S: Step<N>>() -> Self {
         Self(S::run)

@@ -272,6 +272,8 @@ instructions! {
     BitsToF "f.from.bits" (a: Int) -> Float = N::from_f32(f32::from_bits(a));
     FToHalf "half.from.f" (a: Float) -> Int = crate::num::f32_to_f16(a.to_f32());
     HalfToF "f.from.half" (a: Int) -> Float = N::from_f32(crate::num::f16_to_f32(a & 0xffff));
+    // To the nearest binary16.
+    RoundHalf "round.half" (a: Float) -> Float = N::from_f32(crate::num::f16_to_f32(crate::num::f32_to_f16(a.to_f32())));
 }
 
 impl Arith {
@@ -303,6 +305,28 @@ impl Arith {
             Self::RoundF => Self::RoundStepsF,
             other => other,
         }
+    }
+
+    /// Whether the result of binary16 operands may be other than a binary16
+    /// number, so that it has to be rounded to be one.
+    pub(crate) fn leaves_half(self) -> bool {
+        self.result() == Class::Float
+            && !matches!(
+                self,
+                Self::NegF
+                    | Self::AbsF
+                    | Self::SignF
+                    | Self::FloorF
+                    | Self::CeilF
+                    | Self::TruncF
+                    | Self::RoundF
+                    | Self::MinF
+                    | Self::MaxF
+                    | Self::SelectF
+                    | Self::BitsToF
+                    | Self::HalfToF
+                    | Self::RoundHalf
+            )
     }
 
     /// Whether the first two operands may be exchanged.

@@ -7,9 +7,10 @@
 
 pub(crate) mod arith;
 mod op;
+pub(crate) mod subgroup;
 
 pub(crate) use arith::{Arith, Class};
-pub(crate) use op::{AtomicFunction, ImageAccess, ImageQuery, Input, Memory, Op};
+pub(crate) use op::{AtomicFunction, ImageAccess, ImageQuery, Input, Memory, Op, Sampling};
 
 use naga::Span;
 

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::subgroup::SubgroupFunction;
 use super::{Arith, Class};
 
 /// What a kernel is told about its place in the dispatch.
@@ -18,6 +19,8 @@ pub(crate) enum Input {
     BatchedWorkgroupX,
     /// `num_workgroups`, by axis.
     NumWorkgroups(u8),
+    /// `subgroup_size`.
+    SubgroupSize,
     /// All ones in lanes that hold an invocation.
     ActiveLanes,
 }
@@ -53,12 +56,26 @@ pub(crate) enum AtomicFunction {
 pub(crate) struct ImageAccess {
     /// Index into the program's bindings.
     pub(crate) image: u16,
-    /// Number of coordinates: 2, or 3 for 3D and cube directions.
+    /// Number of coordinates: 2, 3 for 3D and cube directions, 1 for filtered
+    /// reads of one dimension.
     pub(crate) coordinates: u8,
     /// Whether a layer (or cube) index follows the coordinates.
     pub(crate) layered: bool,
     /// Whether coordinates are a direction into a cube.
     pub(crate) cube: bool,
+}
+
+/// How a filtered read differs from the plain one at a given level of detail.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub(crate) struct Sampling {
+    /// Added to texel coordinates.
+    pub(crate) offset: [i8; 3],
+    /// Whether a reference is compared with the texels.
+    pub(crate) compare: bool,
+    /// Whether derivatives are given in place of the level.
+    pub(crate) gradient: bool,
+    /// Whether coordinates are kept half a texel from the edges of level 0.
+    pub(crate) clamp: bool,
 }
 
 /// Facts about an image.
@@ -95,6 +112,12 @@ pub(crate) enum Op {
         buffer: u16,
         offset: u32,
         class: Class,
+    },
+    /// One half of a word. Operands: its 16 bits, 0 or 16 for the lower or upper
+    /// half, then the index if there is one.
+    BufferStoreHalf {
+        buffer: u16,
+        offset: u32,
     },
     /// The number of elements of a runtime-sized array.
     BufferLength {
@@ -136,15 +159,37 @@ pub(crate) enum Op {
         access: ImageAccess,
         class: Class,
     },
-    /// Operands: coordinates, layer, level. Results: four channels.
+    /// Operands: coordinates, layer, reference, and the level or the derivatives
+    /// along x and y. Results: four channels.
     ImageSample {
         access: ImageAccess,
         sampler: u16,
+        sampling: Sampling,
+    },
+    /// Operands: coordinates, layer, reference. Results: one channel of the four
+    /// texels that a linear filter would read of level 0.
+    ImageGather {
+        access: ImageAccess,
+        sampler: u16,
+        channel: u8,
+        offset: [i8; 2],
+        compare: bool,
+        class: Class,
+    },
+    /// Operands: coordinates, layer, value.
+    ImageAtomic {
+        access: ImageAccess,
+        function: AtomicFunction,
     },
     /// Operand: the level, for sizes of mipmapped images.
     ImageQuery {
         image: u16,
         query: ImageQuery,
+    },
+    /// Among the active invocations of each subgroup.
+    Subgroup {
+        function: SubgroupFunction,
+        class: Class,
     },
     /// Fails unless every invocation is active.
     Barrier,
@@ -162,6 +207,7 @@ impl Op {
             | Self::Table { .. }
             | Self::BufferLength { .. }
             | Self::ImageSample { .. }
+            | Self::ImageGather { .. }
             | Self::ImageQuery { .. } => true,
             _ => false,
         }
@@ -176,13 +222,16 @@ impl Op {
                     | Self::BufferLoad { .. }
                     | Self::MemoryLoad { .. }
                     | Self::ImageLoad { .. }
+                    | Self::Subgroup { .. }
             )
     }
 
     /// Whether the same operands give the same result in the whole dispatch.
     pub(crate) fn is_dispatch_constant(self) -> bool {
         match self {
-            Self::Input(input) => matches!(input, Input::NumWorkgroups(_)),
+            Self::Input(input) => {
+                matches!(input, Input::NumWorkgroups(_) | Input::SubgroupSize)
+            }
             _ => self.is_pure(),
         }
     }
@@ -198,7 +247,9 @@ impl Op {
                     | Input::BatchedWorkgroupX
             ),
             Self::MemoryLoad { memory, .. } => memory == Memory::Private,
-            Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } => true,
+            Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } | Self::Subgroup { .. } => {
+                true
+            }
             _ => false,
         }
     }
@@ -208,10 +259,13 @@ impl Op {
         matches!(
             self,
             Self::BufferStore { .. }
+                | Self::BufferStoreHalf { .. }
                 | Self::BufferAtomic { .. }
                 | Self::MemoryStore { .. }
                 | Self::WorkgroupAtomic { .. }
                 | Self::ImageStore { .. }
+                | Self::ImageAtomic { .. }
+                | Self::Subgroup { .. }
                 | Self::Barrier
         )
     }
@@ -250,6 +304,7 @@ impl fmt::Display for Op {
                 Input::WorkgroupId(a) => write!(f, "workgroup_id.{}", axis(a)),
                 Input::BatchedWorkgroupX => f.write_str("workgroup_id.x per lane"),
                 Input::NumWorkgroups(a) => write!(f, "num_workgroups.{}", axis(a)),
+                Input::SubgroupSize => f.write_str("subgroup_size"),
                 Input::ActiveLanes => f.write_str("active_lanes"),
             },
             Self::Move(c) => write!(f, "move.{}", class(c)),
@@ -265,6 +320,9 @@ impl fmt::Display for Op {
                 offset,
                 class: c,
             } => write!(f, "store.{} b{buffer}+{offset}", class(c)),
+            Self::BufferStoreHalf { buffer, offset } => {
+                write!(f, "store.half b{buffer}+{offset}")
+            }
             Self::BufferLength { buffer, .. } => write!(f, "length b{buffer}"),
             Self::BufferAtomic {
                 buffer,
@@ -286,10 +344,37 @@ impl fmt::Display for Op {
             }
             Self::ImageLoad { access, .. } => write!(f, "image.load b{}", access.image),
             Self::ImageStore { access, .. } => write!(f, "image.store b{}", access.image),
-            Self::ImageSample { access, sampler } => {
-                write!(f, "image.sample b{} b{sampler}", access.image)
+            Self::ImageSample {
+                access,
+                sampler,
+                sampling,
+            } => {
+                write!(f, "image.sample b{} b{sampler}", access.image)?;
+                for (is, word) in [
+                    (sampling.compare, " compare"),
+                    (sampling.gradient, " gradient"),
+                    (sampling.clamp, " clamp"),
+                ] {
+                    f.write_str(if is { word } else { "" })?;
+                }
+                match sampling.offset {
+                    [0, 0, 0] => Ok(()),
+                    offset => write!(f, " offset {offset:?}"),
+                }
+            }
+            Self::ImageGather {
+                access,
+                sampler,
+                channel,
+                ..
+            } => write!(f, "image.gather.{channel} b{} b{sampler}", access.image),
+            Self::ImageAtomic { access, function } => {
+                write!(f, "image.atomic.{function:?} b{}", access.image)
             }
             Self::ImageQuery { image, query } => write!(f, "image.query b{image} {query:?}"),
+            Self::Subgroup { function, class: c } => {
+                write!(f, "subgroup.{} {function:?}", class(c))
+            }
             Self::Barrier => f.write_str("barrier"),
         }
     }

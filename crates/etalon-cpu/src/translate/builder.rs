@@ -58,6 +58,12 @@ pub(super) struct Builder {
     node_count: u64,
     /// Scopes that something leaves early.
     left: BTreeSet<ScopeId>,
+    /// Whether arithmetic is on `f16`: every result is rounded to binary16.
+    ///
+    /// Computing in binary32 first is harmless for `+ - * /` and square roots:
+    /// 24 bits are at least twice the 11 of binary16 and two more, so the second
+    /// rounding is never led astray by the first.
+    pub(super) half: bool,
     pub(super) span: Span,
 }
 
@@ -72,6 +78,7 @@ impl Builder {
             known: Vec::new(),
             node_count: 0,
             left: BTreeSet::new(),
+            half: false,
             span: Span::default(),
         }
     }
@@ -151,6 +158,14 @@ impl Builder {
 
     /// Emits an arithmetic instruction.
     pub(super) fn arith(&mut self, op: Arith, operands: &[Value]) -> Value {
+        let value = self.arith_once(op, operands);
+        if self.half && op.leaves_half() {
+            return self.arith_once(Arith::RoundHalf, &[value]);
+        }
+        value
+    }
+
+    fn arith_once(&mut self, op: Arith, operands: &[Value]) -> Value {
         if let Some(value) = self.simplify(op, operands) {
             return value;
         }

@@ -5,7 +5,7 @@ use naga::{
     UnaryOperator,
 };
 
-use super::layout::{class_of, describe};
+use super::layout::{class_of, describe, is_half};
 use super::{Fail, Frame, Operand, Place, Translator};
 use crate::ir::{Arith, Class, Op, Value};
 
@@ -200,14 +200,18 @@ impl<'a> Translator<'a> {
                 level,
             } => {
                 if sample.is_some() {
-                    return Err(Fail::unsupported("multisampled textures"));
+                    return Err(Fail::unsupported(crate::binding::MULTISAMPLED));
                 }
                 self.image_load(frame, image, coordinate, array_index, level)?
             }
             Expression::ImageSample { .. } => self.image_sample(frame, expression)?,
             Expression::ImageQuery { image, query } => self.image_query(frame, image, query)?,
             Expression::Unary { op, expr } => self.unary(frame, op, expr)?,
-            Expression::Binary { op, left, right } => self.binary(frame, op, left, right)?,
+            Expression::Binary { op, left, right } => {
+                self.rounded_as(frame, left, |this, frame| {
+                    this.binary(frame, op, left, right)
+                })?
+            }
             Expression::Select {
                 condition,
                 accept,
@@ -233,7 +237,9 @@ impl<'a> Translator<'a> {
                 arg1,
                 arg2,
                 arg3,
-            } => self.math(frame, fun, &[Some(arg), arg1, arg2, arg3])?,
+            } => self.rounded_as(frame, arg, |this, frame| {
+                this.math(frame, fun, &[Some(arg), arg1, arg2, arg3])
+            })?,
             Expression::As {
                 expr,
                 kind,
@@ -241,6 +247,8 @@ impl<'a> Translator<'a> {
             } => self.cast(frame, expr, kind, convert)?,
             Expression::CallResult(_)
             | Expression::AtomicResult { .. }
+            | Expression::SubgroupBallotResult
+            | Expression::SubgroupOperationResult { .. }
             | Expression::WorkGroupUniformLoadResult { .. } => {
                 return Err(Fail::invalid("a result is used before its statement"));
             }
@@ -251,14 +259,26 @@ impl<'a> Translator<'a> {
             | Expression::RayQueryGetIntersection { .. } => {
                 return Err(Fail::unsupported("ray queries"));
             }
-            Expression::SubgroupBallotResult | Expression::SubgroupOperationResult { .. } => {
-                return Err(Fail::unsupported("subgroup operations"));
-            }
             Expression::CooperativeLoad { .. } | Expression::CooperativeMultiplyAdd { .. } => {
                 return Err(Fail::unsupported("cooperative matrices"));
             }
         };
         Ok(Operand::Scalars(values))
+    }
+
+    /// Translates arithmetic whose results are rounded to the precision that
+    /// `operand` has.
+    fn rounded_as<T>(
+        &mut self,
+        frame: &mut Frame<'a>,
+        operand: Handle<Expression>,
+        translate: impl FnOnce(&mut Self, &mut Frame<'a>) -> Result<T, Fail>,
+    ) -> Result<T, Fail> {
+        let half = self.ty(frame, operand).scalar().is_some_and(is_half);
+        let outer = std::mem::replace(&mut self.builder.half, half);
+        let result = translate(self, frame);
+        self.builder.half = outer;
+        result
     }
 
     fn literal(&mut self, literal: Literal) -> Result<Value, Fail> {
@@ -267,7 +287,7 @@ impl<'a> Translator<'a> {
             Literal::U32(value) => self.builder.int(value),
             Literal::I32(value) => self.builder.int(value as u32),
             Literal::Bool(value) => self.builder.bool(value),
-            Literal::F16(_) => return Err(Fail::unsupported("16-bit floating-point scalars")),
+            Literal::F16(value) => self.builder.float(value.to_f32()),
             Literal::I16(_) | Literal::U16(_) => {
                 return Err(Fail::unsupported("16-bit integer scalars"));
             }
@@ -594,19 +614,31 @@ impl<'a> Translator<'a> {
         convert: Option<u8>,
     ) -> Result<Vec<Value>, Fail> {
         let from = self.kind(frame, expression)?;
+        let from_half = self.ty(frame, expression).scalar().is_some_and(is_half);
         let values = self.scalars(frame, expression)?;
-        if let Some(width) = convert
-            && width != 4
-            && to != ScalarKind::Bool
-        {
-            return Err(Fail::unsupported(format!(
-                "{}-bit scalars",
-                u32::from(width) * 8
-            )));
-        }
+        let to_half = match (to, convert) {
+            (ScalarKind::Bool, _) | (_, Some(4)) => false,
+            (ScalarKind::Float, Some(2)) => true,
+            (_, None) if from_half => return Err(Fail::unsupported("bitcasts of f16")),
+            (_, None) => false,
+            (_, Some(width)) => {
+                return Err(Fail::unsupported(format!(
+                    "{}-bit scalars",
+                    u32::from(width) * 8
+                )));
+            }
+        };
         Ok(values
             .into_iter()
-            .map(|value| self.cast_scalar(value, from, to, convert.is_some()))
+            .map(|value| {
+                let value = self.cast_scalar(value, from, to, convert.is_some());
+                // Integers whose binary32 is rounded are beyond binary16.
+                if to_half && !from_half && from != ScalarKind::Bool {
+                    self.builder.arith(Arith::RoundHalf, &[value])
+                } else {
+                    value
+                }
+            })
             .collect())
     }
 

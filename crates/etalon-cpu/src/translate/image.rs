@@ -1,21 +1,15 @@
 //! Texture built-ins.
 
-use naga::{Expression, Handle, ImageClass, SampleLevel, TypeInner};
+use naga::{Expression, Handle, ImageClass, SampleLevel, ScalarKind, TypeInner};
 
 use super::{Fail, Frame, Translator};
-use crate::binding::{BindingKind, ChannelKind, View};
-use crate::ir::{Class, ImageAccess, ImageQuery, Op, Value};
+use crate::binding::{BindingKind, ChannelKind, MULTISAMPLED, View};
+use crate::ir::{Arith, Class, ImageAccess, ImageQuery, Op, Sampling, Value};
 
 impl<'a> Translator<'a> {
     fn access(&self, image: u16, sampled: bool) -> Result<ImageAccess, Fail> {
-        let view = match self
-            .bindings
-            .get(usize::from(image))
-            .map(|binding| binding.kind)
-        {
-            Some(BindingKind::Texture { view, .. } | BindingKind::StorageTexture { view, .. }) => {
-                view
-            }
+        let view = match self.binding_kind(image) {
+            BindingKind::Texture { view, .. } | BindingKind::StorageTexture { view, .. } => *view,
             _ => {
                 return Err(Fail::invalid(
                     "something other than a texture is read as one",
@@ -28,27 +22,29 @@ impl<'a> Translator<'a> {
         }
         Ok(ImageAccess {
             image,
-            coordinates: if matches!(view, View::D2 | View::D2Array) {
-                2
-            } else {
-                3
+            coordinates: match view {
+                View::D1 if sampled => 1,
+                // Loads and stores have 0 as the second coordinate.
+                View::D1 | View::D2 | View::D2Array => 2,
+                View::D3 | View::Cube | View::CubeArray => 3,
             },
             layered: matches!(view, View::D2Array | View::CubeArray),
             cube,
         })
     }
 
+    /// What a resource is; its index comes from the list of bindings.
+    fn binding_kind(&self, resource: u16) -> &BindingKind {
+        &self.bindings[usize::from(resource)].kind
+    }
+
     fn channel_class(&self, image: u16) -> Class {
-        match self
-            .bindings
-            .get(usize::from(image))
-            .map(|binding| binding.kind)
-        {
-            Some(BindingKind::Texture {
+        match self.binding_kind(image) {
+            BindingKind::Texture {
                 kind: ChannelKind::Sint | ChannelKind::Uint,
                 ..
-            }) => Class::Int,
-            Some(BindingKind::StorageTexture { format, .. })
+            } => Class::Int,
+            BindingKind::StorageTexture { format, .. }
                 if matches!(
                     format.sample_kind(),
                     etalon_core::format::SampleKind::Sint | etalon_core::format::SampleKind::Uint
@@ -80,6 +76,14 @@ impl<'a> Translator<'a> {
         layer: Option<Handle<Expression>>,
     ) -> Result<Vec<Value>, Fail> {
         let mut operands = self.scalars(frame, coordinate)?;
+        let one_dimensional = matches!(
+            *self.binding_kind(access.image),
+            BindingKind::Texture { view: View::D1, .. }
+                | BindingKind::StorageTexture { view: View::D1, .. }
+        );
+        if one_dimensional && access.coordinates == 2 {
+            operands.push(self.builder.int(0));
+        }
         if let Some(layer) = layer {
             operands.push(self.scalar(frame, layer)?);
         }
@@ -138,6 +142,32 @@ impl<'a> Translator<'a> {
         Ok(())
     }
 
+    /// Read-modify-write of a texel.
+    pub(super) fn image_atomic(
+        &mut self,
+        frame: &mut Frame<'a>,
+        image: Handle<Expression>,
+        coordinate: Handle<Expression>,
+        layer: Option<Handle<Expression>>,
+        function: naga::AtomicFunction,
+        value: Handle<Expression>,
+    ) -> Result<(), Fail> {
+        let signed = self.kind(frame, value)? == ScalarKind::Sint;
+        let function = super::statement::atomic_function(function, signed);
+        let image = self.resource(frame, image)?;
+        let access = self.access(image, false)?;
+        if self.channel_class(image) != Class::Int {
+            return Err(Fail::unsupported(
+                "atomic operations on textures of other than integers",
+            ));
+        }
+        let mut operands = self.coordinates(frame, access, coordinate, layer)?;
+        operands.push(self.scalar(frame, value)?);
+        self.builder
+            .op(Op::ImageAtomic { access, function }, &operands, &[]);
+        Ok(())
+    }
+
     pub(super) fn image_sample(
         &mut self,
         frame: &mut Frame<'a>,
@@ -157,47 +187,111 @@ impl<'a> Translator<'a> {
         else {
             return Err(Fail::invalid("not a sampling expression"));
         };
-        let refused = [
-            (gather.is_some(), "textureGather"),
-            (depth_ref.is_some(), "comparison sampling"),
-            (offset.is_some(), "texel offsets of samples"),
-            (clamp_to_edge, "textureSampleBaseClampToEdge"),
-            (
-                matches!(level, SampleLevel::Auto | SampleLevel::Bias(_)),
-                "implicit levels of detail (use textureSampleLevel)",
-            ),
-            (
-                matches!(level, SampleLevel::Gradient { .. }),
-                "textureSampleGrad",
-            ),
-        ];
-        if let Some((_, construct)) = refused.iter().find(|(is, _)| *is) {
-            return Err(Fail::unsupported(*construct));
-        }
         let channels = self.channels(frame, image);
-        let is_depth = channels == 1;
         let image = self.resource(frame, image)?;
         let sampler = self.resource(frame, sampler)?;
         let access = self.access(image, true)?;
+        let offset = self.texel_offset(frame, access, offset)?;
         let mut operands = self.coordinates(frame, access, coordinate, array_index)?;
-        operands.push(match level {
+        if let Some(reference) = depth_ref {
+            operands.push(self.scalar(frame, reference)?);
+        }
+        if let Some(channel) = gather {
+            let class = self.channel_class(image);
+            return Ok(self.builder.op(
+                Op::ImageGather {
+                    access,
+                    sampler,
+                    channel: channel as u8,
+                    offset: [offset[0], offset[1]],
+                    compare: depth_ref.is_some(),
+                    class,
+                },
+                &operands,
+                &[class; 4],
+            ));
+        }
+        let mut gradient = false;
+        match level {
+            SampleLevel::Zero => operands.push(self.builder.float(0.0)),
             // Depth textures take an integer.
-            SampleLevel::Exact(level)
-                if is_depth && self.kind(frame, level)? != naga::ScalarKind::Float =>
-            {
-                let level = self.scalar(frame, level)?;
-                self.builder.arith(crate::ir::Arith::SToF, &[level])
+            SampleLevel::Exact(level) => {
+                let kind = self.kind(frame, level)?;
+                let value = self.scalar(frame, level)?;
+                operands.push(match kind {
+                    ScalarKind::Float => value,
+                    ScalarKind::Uint => self.builder.arith(Arith::UToF, &[value]),
+                    _ => self.builder.arith(Arith::SToF, &[value]),
+                });
             }
-            SampleLevel::Exact(level) => self.scalar(frame, level)?,
-            _ => self.builder.float(0.0),
-        });
+            SampleLevel::Gradient { x, y } => {
+                gradient = true;
+                for derivative in [x, y] {
+                    let values = self.scalars(frame, derivative)?;
+                    if values.len() != usize::from(access.coordinates) {
+                        return Err(Fail::invalid("derivatives of another dimension"));
+                    }
+                    operands.extend(values);
+                }
+            }
+            SampleLevel::Auto | SampleLevel::Bias(_) => {
+                return Err(Fail::unsupported(
+                    "implicit levels of detail, which take derivatives across fragments \
+                     (use textureSampleLevel)",
+                ));
+            }
+        }
         let mut values = self.builder.op(
-            Op::ImageSample { access, sampler },
+            Op::ImageSample {
+                access,
+                sampler,
+                sampling: Sampling {
+                    offset,
+                    compare: depth_ref.is_some(),
+                    gradient,
+                    clamp: clamp_to_edge,
+                },
+            },
             &operands,
             &[Class::Float; 4],
         );
+        // A comparison gives one number, as a depth texture does.
         values.truncate(channels);
         Ok(values)
+    }
+
+    /// The constant offset of a filtered read, in texels.
+    fn texel_offset(
+        &mut self,
+        frame: &mut Frame<'a>,
+        access: ImageAccess,
+        offset: Option<Handle<Expression>>,
+    ) -> Result<[i8; 3], Fail> {
+        let mut texels = [0; 3];
+        let Some(offset) = offset else {
+            return Ok(texels);
+        };
+        if access.cube {
+            return Err(Fail::invalid("a texel offset into a cube"));
+        }
+        let values = self.scalars(frame, offset)?;
+        for (texel, value) in texels.iter_mut().zip(values) {
+            let bits = self
+                .builder
+                .constant_bits(value)
+                .ok_or_else(|| Fail::invalid("a texel offset is not constant"))?;
+            // WGSL, textureSampleLevel: each component is in [-8, 7].
+            *texel = i8::try_from(bits as i32)
+                .ok()
+                .filter(|texel| (-8..8).contains(texel))
+                .ok_or_else(|| {
+                    Fail::invalid(format!(
+                        "a texel offset of {} is outside of -8 to 7",
+                        bits as i32
+                    ))
+                })?;
+        }
+        Ok(texels)
     }
 
     pub(super) fn image_query(
@@ -206,14 +300,14 @@ impl<'a> Translator<'a> {
         image: Handle<Expression>,
         query: naga::ImageQuery,
     ) -> Result<Vec<Value>, Fail> {
-        let (three, cube) = match *self.ty(frame, image) {
-            TypeInner::Image { dim, .. } => (
-                dim == naga::ImageDimension::D3,
-                dim == naga::ImageDimension::Cube,
-            ),
+        let axes = match *self.ty(frame, image) {
+            TypeInner::Image { dim, .. } => match dim {
+                naga::ImageDimension::D1 => 1,
+                naga::ImageDimension::D2 | naga::ImageDimension::Cube => 2,
+                naga::ImageDimension::D3 => 3,
+            },
             _ => return Err(Fail::invalid("something other than a texture is queried")),
         };
-        let _ = cube;
         let image = self.resource(frame, image)?;
         let mut ask = |query, operands: &[Value]| {
             self.builder
@@ -225,7 +319,7 @@ impl<'a> Translator<'a> {
                     Some(level) => self.scalar(frame, level)?,
                     None => self.builder.int(0),
                 };
-                (0..if three { 3 } else { 2 })
+                (0..axes)
                     .map(|axis| {
                         self.builder.op(
                             Op::ImageQuery {
@@ -240,7 +334,7 @@ impl<'a> Translator<'a> {
             }
             naga::ImageQuery::NumLevels => vec![ask(ImageQuery::Levels, &[])],
             naga::ImageQuery::NumLayers => vec![ask(ImageQuery::Layers, &[])],
-            naga::ImageQuery::NumSamples => return Err(Fail::unsupported("multisampled textures")),
+            naga::ImageQuery::NumSamples => return Err(Fail::unsupported(MULTISAMPLED)),
         })
     }
 }

@@ -9,6 +9,8 @@ use crate::ir::{Class, Slots};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leaf {
     pub(super) kind: ScalarKind,
+    /// Whether it is an `f16`.
+    pub(super) is_half: bool,
     /// Where it lies in host-shareable memory, in bytes from the start of the type.
     pub(super) offset: u32,
 }
@@ -50,13 +52,15 @@ impl<'a> Translator<'a> {
         match *ty {
             TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => out.push(Leaf {
                 kind: supported(scalar)?,
+                is_half: is_half(scalar),
                 offset,
             }),
             TypeInner::Vector { size, scalar } => {
                 let kind = supported(scalar)?;
                 out.extend((0..size as u32).map(|i| Leaf {
                     kind,
-                    offset: offset.saturating_add(4 * i),
+                    is_half: is_half(scalar),
+                    offset: offset.saturating_add(bytes(scalar) * i),
                 }));
             }
             TypeInner::Matrix {
@@ -66,10 +70,11 @@ impl<'a> Translator<'a> {
             } => {
                 let kind = supported(scalar)?;
                 for column in 0..columns as u32 {
-                    let start = offset.saturating_add(column * column_stride(rows));
+                    let start = offset.saturating_add(column * column_stride(rows, scalar));
                     out.extend((0..rows as u32).map(|row| Leaf {
                         kind,
-                        offset: start.saturating_add(4 * row),
+                        is_half: is_half(scalar),
+                        offset: start.saturating_add(bytes(scalar) * row),
                     }));
                 }
             }
@@ -119,9 +124,19 @@ impl<'a> Translator<'a> {
     }
 }
 
-/// Bytes from one column of a matrix to the next.
-pub(super) fn column_stride(rows: naga::VectorSize) -> u32 {
-    if rows == naga::VectorSize::Bi { 8 } else { 16 }
+/// Bytes of a scalar in memory that the host sees.
+pub(super) fn bytes(scalar: naga::Scalar) -> u32 {
+    if is_half(scalar) { 2 } else { 4 }
+}
+
+pub(super) fn is_half(scalar: naga::Scalar) -> bool {
+    scalar == naga::Scalar::F16
+}
+
+/// Bytes from one column of a matrix to the next: columns are aligned as
+/// vectors are (WGSL §14.4.1).
+pub(super) fn column_stride(rows: naga::VectorSize, scalar: naga::Scalar) -> u32 {
+    bytes(scalar) * if rows == naga::VectorSize::Bi { 2 } else { 4 }
 }
 
 pub(super) fn fixed_length(size: ArraySize) -> Result<u32, Fail> {
@@ -136,9 +151,9 @@ pub(super) fn fixed_length(size: ArraySize) -> Result<u32, Fail> {
 
 fn supported(scalar: naga::Scalar) -> Result<ScalarKind, Fail> {
     match (scalar.kind, scalar.width) {
-        (ScalarKind::Bool, _) | (ScalarKind::Float | ScalarKind::Sint | ScalarKind::Uint, 4) => {
-            Ok(scalar.kind)
-        }
+        (ScalarKind::Bool, _)
+        | (ScalarKind::Float, 2 | 4)
+        | (ScalarKind::Sint | ScalarKind::Uint, 4) => Ok(scalar.kind),
         (kind, width) => Err(Fail::unsupported(format!(
             "{}-bit {} scalars",
             u32::from(width) * 8,

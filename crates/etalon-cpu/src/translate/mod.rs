@@ -9,6 +9,7 @@ mod math;
 mod place;
 mod scan;
 mod statement;
+mod subgroup;
 
 use std::collections::{HashMap, HashSet};
 
@@ -50,6 +51,8 @@ impl Fail {
 pub(crate) struct Translation {
     pub(crate) tree: Tree,
     pub(crate) bindings: Vec<BindingInfo>,
+    /// Bytes of the immediate data, which is the buffer after all bindings.
+    pub(crate) immediates: Option<u32>,
 }
 
 /// The meaning of an expression while translating.
@@ -82,6 +85,7 @@ pub(crate) struct Translator<'a> {
     info: &'a ModuleInfo,
     builder: Builder,
     bindings: Vec<BindingInfo>,
+    immediates: Option<u32>,
     globals: HashMap<Handle<GlobalVariable>, Operand>,
     constants: HashMap<Handle<Expression>, Vec<Value>>,
     indexed: scan::Indexed,
@@ -103,6 +107,7 @@ pub(crate) fn translate(
         info,
         builder: Builder::new(),
         bindings: Vec::new(),
+        immediates: None,
         globals: HashMap::new(),
         constants: HashMap::new(),
         indexed: scan::indexed(module),
@@ -113,6 +118,7 @@ pub(crate) fn translate(
     match translator.entry_point(entry_point) {
         Ok(()) => Ok(Translation {
             bindings: translator.bindings,
+            immediates: translator.immediates,
             tree: translator.builder.finish(),
         }),
         Err(fail) => Err((fail, translator.builder.span)),
@@ -183,6 +189,7 @@ impl<'a> Translator<'a> {
 
     fn declare_globals(&mut self, info: &FunctionInfo) -> Result<(), Fail> {
         let mut names = HashSet::new();
+        let mut immediates = None;
         for (handle, global) in self.module.global_variables.iter() {
             if info[handle].is_empty() {
                 continue;
@@ -191,11 +198,7 @@ impl<'a> Translator<'a> {
             let ty = self.inner(global.ty);
             let operand = match global.space {
                 AddressSpace::Uniform | AddressSpace::Storage { .. } | AddressSpace::Handle => {
-                    let index = u16::try_from(self.bindings.len()).map_err(|_| Fail::TooLarge {
-                        what: "number of bindings",
-                        size: self.bindings.len() as u64,
-                        limit: 1 << 16,
-                    })?;
+                    let index = self.buffer_index()?;
                     let binding = describe_binding(self.module, global)?;
                     names.insert(binding.name.clone());
                     let constant = !binding.is_writable();
@@ -217,6 +220,11 @@ impl<'a> Translator<'a> {
                     self.private_variables.extend(place.variables());
                     Operand::Place(place)
                 }
+                AddressSpace::Immediate => {
+                    // A kernel has one such variable.
+                    immediates = Some((handle, ty));
+                    continue;
+                }
                 space => {
                     return Err(Fail::unsupported(format!(
                         "variables in the address space {space:?}"
@@ -225,7 +233,21 @@ impl<'a> Translator<'a> {
             };
             self.globals.insert(handle, operand);
         }
+        if let Some((handle, ty)) = immediates {
+            self.immediates = Some(ty.size(self.module.to_ctx()));
+            let place = Place::buffer(ty.clone(), self.buffer_index()?, true);
+            self.globals.insert(handle, Operand::Place(place));
+        }
         Ok(())
+    }
+
+    /// The index of what is bound next.
+    fn buffer_index(&self) -> Result<u16, Fail> {
+        u16::try_from(self.bindings.len()).map_err(|_| Fail::TooLarge {
+            what: "number of bindings",
+            size: self.bindings.len() as u64,
+            limit: 1 << 16,
+        })
     }
 
     /// A built-in input, or a struct of them.
@@ -269,6 +291,10 @@ impl<'a> Translator<'a> {
                 })
                 .collect(),
             B::WorkGroupSize => size.iter().map(|&s| self.builder.int(s)).collect(),
+            B::SubgroupSize => vec![self.subgroup_size()],
+            B::SubgroupInvocationId => vec![self.subgroup_invocation_id()],
+            B::SubgroupId => vec![self.subgroup_id()],
+            B::NumSubgroups => vec![self.num_subgroups()],
             other => return Err(Fail::unsupported(format!("the built-in input {other:?}"))),
         };
         Ok(values)

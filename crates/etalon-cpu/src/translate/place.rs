@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use naga::TypeInner;
 
-use super::layout::{column_stride, fixed_length};
+use super::layout::{bytes, column_stride, fixed_length};
 use super::{Fail, Translator};
 use crate::ir::{Arith, AtomicFunction, Class, Memory, Op, Slots, Value, Variable};
 
@@ -28,11 +28,13 @@ enum Root {
         slots: Slots,
         computed: Option<(Value, Value)>,
     },
-    /// Bytes of a buffer; the computed part is in words.
+    /// Bytes of a buffer; the computed part is in words, and in halves of words
+    /// where elements of `f16` are not a whole number of words.
     Buffer {
         buffer: u16,
         offset: u32,
         computed: Option<Value>,
+        halves: Option<Value>,
         constant: bool,
     },
 }
@@ -45,6 +47,7 @@ impl Place {
                 buffer,
                 offset: 0,
                 computed: None,
+                halves: None,
                 constant,
             },
         }
@@ -188,11 +191,18 @@ impl Translator<'_> {
                     None => (float, int),
                 });
             }
-            Root::Buffer { computed, .. } => {
-                let words = self.scaled(index, stride / 4);
-                *computed = Some(match *computed {
-                    Some(base) => self.builder.arith(Arith::AddI, &[base, words]),
-                    None => words,
+            Root::Buffer {
+                computed, halves, ..
+            } => {
+                let (sum, unit) = if stride % 4 == 0 {
+                    (computed, 4)
+                } else {
+                    (halves, 2)
+                };
+                let units = self.scaled(index, stride / unit);
+                *sum = Some(match *sum {
+                    Some(base) => self.builder.arith(Arith::AddI, &[base, units]),
+                    None => units,
                 });
             }
         }
@@ -207,10 +217,10 @@ impl Translator<'_> {
     /// The type of the elements, and bytes between them.
     fn element(&self, ty: &TypeInner) -> Result<(TypeInner, u32), Fail> {
         match *ty {
-            TypeInner::Vector { scalar, .. } => Ok((TypeInner::Scalar(scalar), 4)),
+            TypeInner::Vector { scalar, .. } => Ok((TypeInner::Scalar(scalar), bytes(scalar))),
             TypeInner::Matrix { rows, scalar, .. } => Ok((
                 TypeInner::Vector { size: rows, scalar },
-                column_stride(rows),
+                column_stride(rows, scalar),
             )),
             TypeInner::Array { base, stride, .. } => Ok((self.inner(base).clone(), stride)),
             _ => Err(Fail::invalid(
@@ -263,6 +273,34 @@ impl Translator<'_> {
         }
     }
 
+    /// Where an `f16` is, `offset` bytes and the computed parts from the start of
+    /// a buffer.
+    fn half_at(&mut self, offset: u32, computed: Option<Value>, halves: Option<Value>) -> HalfAt {
+        let b = &mut self.builder;
+        let Some(halves) = halves else {
+            return HalfAt {
+                word: offset / 4,
+                index: computed,
+                shift: b.int(offset % 4 / 2 * 16),
+            };
+        };
+        let before = b.int(offset / 2);
+        let halves = b.arith(Arith::AddI, &[halves, before]);
+        let (one, four) = (b.int(1), b.int(4));
+        let odd = b.arith(Arith::And, &[halves, one]);
+        let shift = b.arith(Arith::Shl, &[odd, four]);
+        let word = b.arith(Arith::ShrU, &[halves, one]);
+        let index = match computed {
+            Some(computed) => b.arith(Arith::AddI, &[computed, word]),
+            None => word,
+        };
+        HalfAt {
+            word: 0,
+            index: Some(index),
+            shift,
+        }
+    }
+
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Value>, Fail> {
         let leaves = self.leaves(&place.ty)?;
         let mut slots = Slots::default();
@@ -292,7 +330,29 @@ impl Translator<'_> {
                     buffer,
                     offset,
                     computed,
+                    halves,
                     constant,
+                } if leaf.is_half => {
+                    let at = self.half_at(offset.saturating_add(leaf.offset), computed, halves);
+                    let word = self.builder.op(
+                        Op::BufferLoad {
+                            buffer,
+                            offset: at.word,
+                            class: Class::Int,
+                            constant,
+                        },
+                        at.index.as_slice(),
+                        &[Class::Int],
+                    )[0];
+                    let half = self.builder.arith(Arith::ShrU, &[word, at.shift]);
+                    self.builder.arith(Arith::HalfToF, &[half])
+                }
+                &Root::Buffer {
+                    buffer,
+                    offset,
+                    computed,
+                    constant,
+                    ..
                 } => {
                     let offset = offset.saturating_add(leaf.offset) / 4;
                     self.builder.op(
@@ -335,6 +395,26 @@ impl Translator<'_> {
                             memory,
                             slot,
                             class,
+                        },
+                        &operands,
+                        &[],
+                    );
+                }
+                &Root::Buffer {
+                    buffer,
+                    offset,
+                    computed,
+                    halves,
+                    ..
+                } if leaf.is_half => {
+                    let at = self.half_at(offset.saturating_add(leaf.offset), computed, halves);
+                    let half = self.builder.arith(Arith::FToHalf, &[value]);
+                    let operands: Vec<Value> =
+                        [half, at.shift].into_iter().chain(at.index).collect();
+                    self.builder.op(
+                        Op::BufferStoreHalf {
+                            buffer,
+                            offset: at.word,
                         },
                         &operands,
                         &[],
@@ -408,6 +488,16 @@ impl Translator<'_> {
         let operands: Vec<Value> = values.iter().copied().chain(index).collect();
         Ok(self.builder.op(op, &operands, &[Class::Int])[0])
     }
+}
+
+/// Where an `f16` of a buffer is.
+struct HalfAt {
+    /// Fixed part of the word's index.
+    word: u32,
+    /// Computed part of the word's index.
+    index: Option<Value>,
+    /// 0 for the lower half, 16 for the upper one.
+    shift: Value,
 }
 
 /// Where the next scalar of `class` lies; `taken` counts the ones before.

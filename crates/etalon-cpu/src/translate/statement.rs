@@ -191,6 +191,8 @@ impl<'a> Translator<'a> {
                 array_index,
                 value,
             } => self.image_store(frame, *image, *coordinate, *array_index, *value)?,
+            // Lanes of a subgroup are in step as all others.
+            Statement::ControlBarrier(naga::Barrier::SUB_GROUP) => {}
             Statement::ControlBarrier(_) => self.builder.barrier(),
             // Lanes run in lockstep, so memory is always up to date.
             Statement::MemoryBarrier(_) => {}
@@ -213,17 +215,30 @@ impl<'a> Translator<'a> {
                 result,
             } => self.call(frame, *function, arguments, *result)?,
             Statement::Kill => return Err(Fail::unsupported("`discard`")),
-            Statement::ImageAtomic { .. } => {
-                return Err(Fail::unsupported("atomic operations on textures"));
-            }
+            Statement::ImageAtomic {
+                image,
+                coordinate,
+                array_index,
+                fun,
+                value,
+            } => self.image_atomic(frame, *image, *coordinate, *array_index, *fun, *value)?,
             Statement::RayQuery { .. } | Statement::RayPipelineFunction(_) => {
                 return Err(Fail::unsupported("ray tracing"));
             }
-            Statement::SubgroupBallot { .. }
-            | Statement::SubgroupGather { .. }
-            | Statement::SubgroupCollectiveOperation { .. } => {
-                return Err(Fail::unsupported("subgroup operations"));
+            Statement::SubgroupBallot { result, predicate } => {
+                self.subgroup_ballot(frame, *result, *predicate)?;
             }
+            Statement::SubgroupGather {
+                mode,
+                argument,
+                result,
+            } => self.subgroup_gather(frame, *mode, *argument, *result)?,
+            Statement::SubgroupCollectiveOperation {
+                op,
+                collective_op,
+                argument,
+                result,
+            } => self.subgroup_collective(frame, *op, *collective_op, *argument, *result)?,
             Statement::CooperativeStore { .. } => {
                 return Err(Fail::unsupported("cooperative matrices"));
             }
@@ -429,31 +444,19 @@ impl<'a> Translator<'a> {
         value: Handle<Expression>,
         result: Option<Handle<Expression>>,
     ) -> Result<(), Fail> {
-        use naga::AtomicFunction as A;
         let place = self.place(frame, pointer)?;
         let signed = self.kind(frame, value)? == naga::ScalarKind::Sint;
         let mut values = vec![self.scalar(frame, value)?];
         let mut compared = None;
-        let function = match *function {
-            A::Add => AtomicFunction::Add,
-            A::Subtract => AtomicFunction::Sub,
-            A::And => AtomicFunction::And,
-            A::ExclusiveOr => AtomicFunction::Xor,
-            A::InclusiveOr => AtomicFunction::Or,
-            A::Min if signed => AtomicFunction::MinS,
-            A::Min => AtomicFunction::MinU,
-            A::Max if signed => AtomicFunction::MaxS,
-            A::Max => AtomicFunction::MaxU,
-            A::Exchange { compare: None } => AtomicFunction::Exchange,
-            A::Exchange {
-                compare: Some(compare),
-            } => {
-                let expected = self.scalar(frame, compare)?;
-                values.insert(0, expected);
-                compared = Some(expected);
-                AtomicFunction::CompareExchange
-            }
-        };
+        if let naga::AtomicFunction::Exchange {
+            compare: Some(compare),
+        } = *function
+        {
+            let expected = self.scalar(frame, compare)?;
+            values.insert(0, expected);
+            compared = Some(expected);
+        }
+        let function = atomic_function(*function, signed);
         let old = self.atomic(&place, function, &values)?;
         if let Some(result) = result {
             let mut values = vec![old];
@@ -464,6 +467,24 @@ impl<'a> Translator<'a> {
             frame.operands.insert(result, Operand::Scalars(values));
         }
         Ok(())
+    }
+}
+
+/// An atomic function on integers that are signed or not.
+pub(super) fn atomic_function(function: naga::AtomicFunction, signed: bool) -> AtomicFunction {
+    use naga::AtomicFunction as A;
+    match function {
+        A::Add => AtomicFunction::Add,
+        A::Subtract => AtomicFunction::Sub,
+        A::And => AtomicFunction::And,
+        A::ExclusiveOr => AtomicFunction::Xor,
+        A::InclusiveOr => AtomicFunction::Or,
+        A::Min if signed => AtomicFunction::MinS,
+        A::Min => AtomicFunction::MinU,
+        A::Max if signed => AtomicFunction::MaxS,
+        A::Max => AtomicFunction::MaxU,
+        A::Exchange { compare: None } => AtomicFunction::Exchange,
+        A::Exchange { compare: Some(_) } => AtomicFunction::CompareExchange,
     }
 }
 

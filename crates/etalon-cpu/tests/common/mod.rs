@@ -14,6 +14,8 @@ pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
         naga::valid::ValidationFlags::all(),
         naga::valid::Capabilities::all(),
     )
+    .subgroup_stages(naga::valid::ShaderStages::all())
+    .subgroup_operations(naga::valid::SubgroupOperationSet::all())
     .validate(&module)
     .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
     Program::from_module("test", wgsl, &module, &info, "main")

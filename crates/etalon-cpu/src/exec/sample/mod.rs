@@ -1,0 +1,412 @@
+//! Handlers of filtered reads.
+//!
+//! Coordinates and weights are `f32` in every number type, as devices' filters
+//! are. Levels of detail, texel addresses and weights follow Vulkan 1.3, §16.6
+//! to §16.9 (normalised texel coordinates, level of detail, unnormalised
+//! coordinates, sample operations), which WGSL §17.7 leaves to the API.
+
+mod axis;
+mod cube;
+mod gather;
+mod general;
+mod lod;
+
+use etalon_core::Format;
+use etalon_core::resource::{Compare, Filter, SamplerDesc};
+
+use self::axis::AxisTexels;
+use self::lod::Lod;
+use super::image::{texture, wanted};
+use super::isa::Isa;
+use super::link::Instr;
+use super::memory::rounds;
+use super::state::{Resource, State};
+use super::texels::fetch;
+use super::tier::{Handler, Tier, TieredStep};
+use crate::code::Slot;
+use crate::ir::{ImageAccess, Op};
+use crate::memory::{Channels, Level, TextureView};
+use crate::num::{Number, mask};
+use crate::registers::LANES;
+
+pub(super) fn sample<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
+    if varying {
+        Handler::tiered::<Sample<LANES>>(tier)
+    } else {
+        Handler::portable::<Sample<1>>()
+    }
+}
+
+pub(super) fn gather<N: Number>(tier: Tier, varying: bool) -> Handler<N> {
+    if varying {
+        Handler::tiered::<gather::Gather<LANES>>(tier)
+    } else {
+        Handler::portable::<gather::Gather<1>>()
+    }
+}
+
+struct Sample<const K: usize>;
+
+impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
+    #[inline(always)]
+    fn run<I: Isa>(state: &mut State<'_, N>, instr: &Instr) {
+        let inst = state.inst(instr.index);
+        let Op::ImageSample {
+            access,
+            sampler,
+            sampling,
+        } = inst.op
+        else {
+            return;
+        };
+        let Some(request) = Request::new(
+            state,
+            access,
+            sampler,
+            wanted(inst),
+            sampling.offset.map(i32::from),
+            sampling.compare,
+        ) else {
+            return;
+        };
+        for chunk in 0..rounds::<N, K>(state) {
+            let (mut place, rest) = Place::<K>::read(state, &request, &inst.operands, chunk);
+            if sampling.clamp {
+                request.clamp_to_edge(&mut place);
+            }
+            let lod = match *rest {
+                [level] if !sampling.gradient => {
+                    if level.varying {
+                        Lod::Each(state.floats::<K>(level, chunk).map(N::to_f32))
+                    } else {
+                        Lod::Same(state.floats::<1>(level, chunk).map(N::to_f32)[0])
+                    }
+                }
+                _ => {
+                    let derivative = |first: usize| {
+                        std::array::from_fn(|axis| match rest.get(first + axis) {
+                            Some(&slot) if axis < request.axes => {
+                                state.floats::<K>(slot, chunk).map(N::to_f32)
+                            }
+                            _ => [0.0; K],
+                        })
+                    };
+                    Lod::Each(request.gradient(&place, &derivative(0), &derivative(request.axes)))
+                }
+            };
+            let channels = request.sample::<I, K>(&place, &lod);
+            for (result, channel) in inst.results.iter().zip(&channels) {
+                if let Some(to) = *result {
+                    state.set_bits(to, chunk, &channel.map(f32::to_bits));
+                }
+            }
+        }
+    }
+}
+
+/// Where lanes read.
+struct Place<const K: usize> {
+    /// Normalised coordinates; zero along axes that the texture has not.
+    at: [[f32; K]; 3],
+    /// Layer or cube as given, not yet clamped.
+    layer: [u32; K],
+    /// What texels are compared with.
+    reference: [f32; K],
+}
+
+impl<const K: usize> Place<K> {
+    /// Takes the operands that all filtered reads begin with; returns the rest.
+    #[inline(always)]
+    fn read<'o, N: Number>(
+        state: &State<'_, N>,
+        request: &Request<'_>,
+        operands: &'o [Slot],
+        chunk: usize,
+    ) -> (Self, &'o [Slot]) {
+        let (coordinates, mut rest) = operands.split_at(request.axes.min(operands.len()));
+        let mut place = Self {
+            at: [[0.0; K]; 3],
+            layer: [0; K],
+            reference: [0.0; K],
+        };
+        for (at, &slot) in place.at.iter_mut().zip(coordinates) {
+            *at = state.floats::<K>(slot, chunk).map(N::to_f32);
+        }
+        if request.layered
+            && let [layer, after @ ..] = rest
+        {
+            place.layer = state.ints(*layer, chunk);
+            rest = after;
+        }
+        if request.compare.is_some()
+            && let [reference, after @ ..] = rest
+        {
+            place.reference = state.floats::<K>(*reference, chunk).map(N::to_f32);
+            if request.texture.desc().format == Format::Depth16Unorm {
+                // Fixed-point depth is compared with what it could hold.
+                place.reference = place
+                    .reference
+                    .map(|reference| Number::min(Number::max(reference, 0.0), 1.0));
+            }
+            rest = after;
+        }
+        (place, rest)
+    }
+}
+
+/// What is read and how, the same for all lanes.
+struct Request<'a> {
+    texture: &'a TextureView<'a>,
+    sampler: SamplerDesc,
+    wanted: [bool; 4],
+    /// Number of coordinates.
+    axes: usize,
+    layered: bool,
+    cube: bool,
+    /// In texels.
+    offset: [i32; 3],
+    compare: Option<Compare>,
+}
+
+impl<'a> Request<'a> {
+    #[inline(always)]
+    fn new<N: Number>(
+        state: &State<'a, N>,
+        access: ImageAccess,
+        sampler: u16,
+        wanted: [bool; 4],
+        offset: [i32; 3],
+        compare: bool,
+    ) -> Option<Self> {
+        let Some(&Resource::Sampler(sampler)) = state.resources.get(usize::from(sampler)) else {
+            return None;
+        };
+        Some(Self {
+            texture: texture(state, access.image)?,
+            sampler,
+            wanted,
+            axes: usize::from(access.coordinates),
+            layered: access.layered,
+            cube: access.cube,
+            offset,
+            compare: sampler.compare.filter(|_| compare),
+        })
+    }
+
+    /// WGSL's `textureSampleBaseClampToEdge`: half a texel stays on each side.
+    #[inline(always)]
+    fn clamp_to_edge<const K: usize>(&self, place: &mut Place<K>) {
+        if let Some(level) = self.texture.levels.first() {
+            for (at, size) in place.at.iter_mut().zip([level.width, level.height]) {
+                let half = 0.5 / size as f32;
+                let far = 1.0 - half;
+                for k in 0..K {
+                    at[k] = Number::min(Number::max(at[k], half), far);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sample<I: Isa, const K: usize>(&self, place: &Place<K>, lod: &Lod<K>) -> [[f32; K]; 4] {
+        let lods = match lod {
+            Lod::Same(lod) => [self.clamp_lod(*lod); K],
+            Lod::Each(lods) => lods.map(|lod| self.clamp_lod(lod)),
+        };
+        let first = lods[0].to_bits();
+        let others = lods
+            .iter()
+            .fold(0, |all, lod| all | (lod.to_bits() ^ first));
+        if others == 0 && self.axes == 2 && !self.cube {
+            self.at_level::<I, K>(place, lods[0])
+        } else {
+            self.at_levels::<I, K>(place, &lods)
+        }
+    }
+
+    /// All lanes at one level of detail of a flat texture.
+    #[inline(always)]
+    fn at_level<I: Isa, const K: usize>(&self, place: &Place<K>, lod: f32) -> [[f32; K]; 4] {
+        let linear = self.filter(lod) == Filter::Linear;
+        let (fine, weight) = self.mips(lod);
+        let mut sum = [[0.0; K]; 4];
+        for step in 0..if weight > 0.0 { 2 } else { 1 } {
+            let scale = if step == 1 { weight } else { 1.0 - weight };
+            self.add_flat::<I, K>(self.level(fine + step), linear, scale, place, &mut sum);
+        }
+        sum
+    }
+
+    /// Each lane at a level of detail of its own.
+    #[inline(always)]
+    fn at_levels<I: Isa, const K: usize>(
+        &self,
+        place: &Place<K>,
+        lods: &[f32; K],
+    ) -> [[f32; K]; 4] {
+        let mips = lods.map(|lod| self.mips(lod));
+        let steps = if mips.iter().any(|&(_, weight)| weight > 0.0) {
+            2
+        } else {
+            1
+        };
+        let mut result = [[0.0; K]; 4];
+        // First with the filter of what is minified, then of what is not.
+        for minified in [true, false] {
+            let filter = if minified {
+                self.sampler.min_filter
+            } else if self.sampler.mag_filter == self.sampler.min_filter {
+                break;
+            } else {
+                self.sampler.mag_filter
+            };
+            let linear = filter == Filter::Linear;
+            let mut sum = [[0.0; K]; 4];
+            for step in 0..steps {
+                let levels = mips.map(|(fine, _)| self.level(fine + step));
+                let scale = mips.map(|(_, weight)| if step == 1 { weight } else { 1.0 - weight });
+                let mut both = sum;
+                self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
+                for (sum, both) in sum.iter_mut().zip(&both) {
+                    for k in 0..K {
+                        // A lane that reads one level only must not see the other.
+                        sum[k] = Number::select(mask(scale[k] > 0.0), both[k], sum[k]);
+                    }
+                }
+            }
+            for (result, sum) in result.iter_mut().zip(&sum) {
+                for k in 0..K {
+                    let takes = mask(minified | (lods[k] <= 0.0));
+                    result[k] = Number::select(takes, sum[k], result[k]);
+                }
+            }
+        }
+        result
+    }
+
+    /// Adds what one level of a flat texture has, times `scale`.
+    #[inline(always)]
+    fn add_flat<I: Isa, const K: usize>(
+        &self,
+        level: Level,
+        linear: bool,
+        scale: f32,
+        place: &Place<K>,
+        sum: &mut [[f32; K]; 4],
+    ) {
+        let Level {
+            width,
+            height,
+            depth,
+            start,
+        } = level;
+        let axis = |axis: usize, size| {
+            AxisTexels::new(
+                self.sampler.address[axis],
+                &place.at[axis],
+                size,
+                self.offset[axis],
+                linear,
+            )
+        };
+        let (x, y) = (axis(0, width), axis(1, height));
+        let mut rows = y.texels;
+        if self.layered {
+            let last = depth as i32 - 1;
+            for k in 0..K {
+                let layer = (place.layer[k] as i32).max(0).min(last) as u32;
+                let first = start + layer * height * width;
+                for row in &mut rows {
+                    row[k] = first + row[k] * width;
+                }
+            }
+        } else {
+            for row in &mut rows {
+                for k in 0..K {
+                    row[k] = start + row[k] * width;
+                }
+            }
+        }
+        for tap in 0..if linear { 4 } else { 1 } {
+            let (dx, dy) = (tap & 1, tap >> 1);
+            let (mut index, mut weight) = ([0; K], [scale; K]);
+            for k in 0..K {
+                index[k] = rows[dy][k] + x.texels[dx][k];
+            }
+            if linear {
+                for k in 0..K {
+                    let horizontal = if dx == 1 {
+                        x.weight[k]
+                    } else {
+                        1.0 - x.weight[k]
+                    };
+                    let vertical = if dy == 1 {
+                        y.weight[k]
+                    } else {
+                        1.0 - y.weight[k]
+                    };
+                    weight[k] = scale * horizontal * vertical;
+                }
+            }
+            let channels = self.texels::<I, K>(&index, &place.reference);
+            self.add_weighted(&channels, &weight, sum);
+        }
+    }
+
+    /// The wanted channels of texels, or what comparing them gives.
+    #[inline(always)]
+    fn texels<I: Isa, const K: usize>(
+        &self,
+        index: &[u32; K],
+        reference: &[f32; K],
+    ) -> Channels<K> {
+        let mut channels = [[0; K]; 4];
+        fetch::<I, K>(self.texture, index, self.wanted, &mut channels);
+        if let Some(compare) = self.compare {
+            channels[0] = compared(compare, reference, &channels[0]);
+        }
+        channels
+    }
+
+    /// Adds texels times their weights.
+    #[inline(always)]
+    fn add_weighted<const K: usize>(
+        &self,
+        channels: &Channels<K>,
+        weight: &[f32; K],
+        sum: &mut [[f32; K]; 4],
+    ) {
+        for (channel, sum) in sum.iter_mut().enumerate() {
+            if self.wanted[channel] {
+                for k in 0..K {
+                    sum[k] += weight[k] * f32::from_bits(channels[channel][k]);
+                }
+            }
+        }
+    }
+}
+
+/// 1 where `reference OP texel`, 0 elsewhere.
+#[inline(always)]
+fn compared<const K: usize>(compare: Compare, reference: &[f32; K], texel: &[u32; K]) -> [u32; K] {
+    let one = 1.0_f32.to_bits();
+    let mut result = [0; K];
+    macro_rules! each {
+        ($op:tt) => {
+            for k in 0..K {
+                result[k] = mask(reference[k] $op f32::from_bits(texel[k])) & one;
+            }
+        };
+    }
+    match compare {
+        Compare::Never => {}
+        Compare::Less => each!(<),
+        Compare::Equal => each!(==),
+        Compare::LessEqual => each!(<=),
+        Compare::Greater => each!(>),
+        Compare::NotEqual => each!(!=),
+        Compare::GreaterEqual => each!(>=),
+        Compare::Always => result = [one; K],
+    }
+    result
+}

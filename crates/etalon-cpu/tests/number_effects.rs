@@ -1,7 +1,6 @@
 //! Number types on every pass of every effect.
 
-use etalon_core::Format;
-use etalon_core::backend::{Backend, CapturedData, Execution};
+use etalon_core::backend::{Backend, Execution};
 use etalon_core::graph::Graph;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanOptions};
@@ -131,50 +130,40 @@ fn wide_results_are_the_same_on_every_tier_and_number_of_threads() {
 /// are one program in three precisions: the shadow is the f64 run, and the f32
 /// run is off by rounding.
 #[test]
-fn bloom_in_f64_is_its_shadow_and_near_its_f32() {
+fn exposure_in_f64_is_its_shadow_and_near_its_f32() {
     let frame = small();
-    let bloom = etalon_effects::registry::effect("bloom").unwrap();
+    let exposure = etalon_effects::registry::effect("exposure").unwrap();
     let wide = |number_type| {
         let mut backend = backend(number_type, Tier::best(), 1);
-        let plan = plan(&backend, &frame, bloom, Arithmetic::Fast);
+        let plan = plan(&backend, &frame, exposure, Arithmetic::Fast);
         run(&mut backend, &plan, &frame).remove(0)
     };
     let [single, double, shadow] = NumberType::ALL.map(wide);
-    let mut passes = 0;
+    assert!(wide_bits(&double.captures) == wide_bits(&shadow.captures));
     let mut rounded = 0;
     for (i, captured) in double.execution.captures.iter().enumerate() {
-        let CapturedData::Texture(image) = &captured.data else {
-            panic!("no texture")
-        };
-        assert_eq!(image.desc.format, Format::Rgba16Float);
         let texels = |execution: &WideExecution| match &execution.captures[i] {
             WideCapture::Texture(texels) => texels.clone(),
-            other => panic!("{other:?}"),
+            other => panic!("{}: {other:?}", captured.pass),
         };
-        let (single, double, shadow) = (texels(&single), texels(&double), texels(&shadow));
-        let brightest = double.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
-        passes += 1;
-        for ((single, double), shadow) in single.iter().zip(&double).zip(&shadow) {
+        for (single, double) in texels(&single).iter().zip(&texels(&double)) {
             for c in 0..4 {
-                // The filter reads f32 coordinates in both; threshold and knee
-                // are continuous, so where a comparison goes the other way the
-                // values differ by no more than rounding of f32.
+                // Sums are trees of eight additions of some ten operations each,
+                // in three passes and of one sign, and the logarithm of the mean
+                // is below 16: all in all less than 1000 units of f32.
+                let bound = 1000.0 * 2.0_f64.powi(-24) * double[c].abs().max(1.0);
                 assert!(
-                    (double[c] - shadow[c]).abs() <= 1.0e-6 * brightest,
-                    "pass {passes}"
+                    (single[c] - double[c]).abs() <= bound,
+                    "{}: {} and {}",
+                    captured.pass,
+                    single[c],
+                    double[c]
                 );
-                // Each pass rounds to f16: half a unit is 2^-11 of the value,
-                // and weights sum to one.
-                let bound = f64::from(passes) * 2.0_f64.powi(-11) * 1.01 * brightest;
-                assert!((single[c] - double[c]).abs() <= bound, "pass {passes}");
                 rounded += usize::from(single[c] != double[c]);
             }
         }
     }
-    assert!(
-        passes > 3 && rounded > 1000,
-        "{passes} passes, {rounded} rounded"
-    );
+    assert!(rounded > 10, "{rounded} values rounded");
 }
 
 #[test]

@@ -131,7 +131,7 @@ fn arithmetic_is_that_of_f64() {
                 - (t * literal(1.7)).floor() * literal(0.3)
                 + rest;
         }
-        let expected = sum.max(-40.5).min(1.0e6) + literal(0.1);
+        let expected = sum.clamp(-40.5, 1.0e6) + literal(0.1);
         assert_eq!(got.wide[i], Some(expected), "{i}");
         assert_eq!(got.words[i], (expected as f32).to_bits(), "{i}");
     }
@@ -263,14 +263,18 @@ enum Line {
     Binary(u32, usize, usize),
 }
 
-const UNARY: [(&str, fn(f64) -> f64); 5] = [
+type Unary = (&'static str, fn(f64) -> f64);
+
+const UNARY: [Unary; 5] = [
     ("abs(A)", f64::abs),
     ("sqrt(abs(A))", |a| a.abs().sqrt()),
     ("floor(A)", f64::floor),
     ("round(A)", f64::round_ties_even),
     ("(-A)", |a| -a),
 ];
-const BINARY: [(&str, fn(f64, f64) -> f64); 6] = [
+type Binary = (&'static str, fn(f64, f64) -> f64);
+
+const BINARY: [Binary; 6] = [
     ("(A + B)", |a, b| a + b),
     ("(A - B)", |a, b| a - b),
     ("(A * B)", |a, b| a * b),
@@ -399,10 +403,10 @@ fn bits_are_those_of_the_nearest_f32() {
     let data = inputs();
     for number_type in [NumberType::F64, NumberType::Shadow] {
         let got = run(wgsl, number_type, &data, 256, 1);
-        for lane in 0..64 {
-            let third = f64::from(data[lane]) / 3.0;
+        for (lane, &x) in data.iter().enumerate().take(64) {
+            let third = f64::from(x) / 3.0;
             // Dividing 24-bit numbers by 3 rounds alike once and twice.
-            let single = data[lane] / 3.0;
+            let single = x / 3.0;
             assert_eq!(single, third as f32);
             let want = [
                 third,

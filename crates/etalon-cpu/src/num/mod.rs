@@ -33,7 +33,9 @@ use crate::registers::Lane;
 /// (in [`NumberType::Shadow`], of the `f32`), and a number made of bits is an
 /// `f32`. A kernel that rounds by operations on bits therefore rounds in every
 /// type, and one that takes numbers apart by them does so to `f32` accuracy.
-/// Coordinates, levels and weights of filtered reads are `f32` as well.
+///
+/// Filtered reads are `f32` in every type: coordinates, weights, and the texels,
+/// which are those in the format and not those of a wide plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum NumberType {
     /// As devices compute.

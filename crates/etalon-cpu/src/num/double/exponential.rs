@@ -1,7 +1,7 @@
 //! Exponentials and powers.
 
 use super::logarithm::log2_parts;
-use super::{MAGIC, choose, power_of_two};
+use super::{MAGIC, choose, magnitude, power_of_two};
 
 pub(super) const LOG2E: f64 = std::f64::consts::LOG2_E;
 /// ln 2 in two parts; the first has 40 bits, so that its product with a whole
@@ -37,7 +37,7 @@ fn scaled_exponential(high: f64, low: f64, n: f64) -> f64 {
 #[inline(always)]
 fn exp2_parts(high: f64, low: f64) -> f64 {
     // Beyond these limits the result is 0 or infinite; NaN stays what it is.
-    let outside = (high > 1100.0) | (high < -1100.0);
+    let outside = magnitude(high) > 1100.0;
     let limit = choose(high > 0.0, 1100.0, -1100.0);
     let (high, low) = (choose(outside, limit, high), choose(outside, 0.0, low));
     let n = (high + MAGIC) - MAGIC;

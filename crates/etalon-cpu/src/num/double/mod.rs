@@ -50,10 +50,10 @@ fn power_of_two(shifted: f64) -> f64 {
     f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52)
 }
 
-/// The integer part of `|x|`, at most `u32::MAX`; anything for NaN.
+/// The integer part of `|x|`, at most the largest `f32` below 2^32; anything for NaN.
 #[inline(always)]
 fn truncated_magnitude(x: f64) -> u32 {
-    const LARGEST: f64 = u32::MAX as f64;
+    const LARGEST: f64 = 4_294_967_040.0;
     // From here on the unit of f64 is 1: adding rounds to the nearest integer.
     const UNIT: f64 = 4_503_599_627_370_496.0;
     let x = magnitude(x);
@@ -246,7 +246,7 @@ impl Number for f64 {
     #[inline(always)]
     fn to_i32(self) -> i32 {
         let negative = mask(self < 0.0);
-        let magnitude = truncated_magnitude(self).min(0x7fff_ffff + (negative & 1));
+        let magnitude = truncated_magnitude(self).min(0x7fff_ff80 + (negative & 0x80));
         let value = (magnitude ^ negative).wrapping_sub(negative);
         (value & !mask(self.is_nan())) as i32
     }

@@ -204,7 +204,7 @@ fn check(
         let want = exact(x.into());
         let error = error(ours(x), want);
         // NaN is the largest error of all.
-        if !(error <= worst.0) {
+        if error > worst.0 || error.is_nan() {
             worst = (error, x);
         }
         seen += 1;
@@ -443,11 +443,13 @@ fn special_values_are_those_of_the_single_functions() {
     }
     assert_eq!(Number::ldexp(1.0_f64, -1074), f64::from_bits(1));
     assert_eq!(Number::ldexp(f64::from_bits(1), 1074), 1.0);
-    for value in [0, 1, -1, i32::MAX, i32::MIN, 0x0100_0001] {
+    for value in [0, 1, -1, i32::MIN, 0x0100_0001, 0x7fff_ff80] {
         assert_eq!(<f64 as Number>::from_i32(value).to_i32(), value);
-        assert_eq!(
-            <f64 as Number>::from_u32(value as u32).to_u32(),
-            value as u32
-        );
     }
+    for value in [0, 1, 0x0100_0001, 0x8000_0000, 0xffff_ff00] {
+        assert_eq!(<f64 as Number>::from_u32(value).to_u32(), value);
+    }
+    // Beyond what f32 and the integers have both.
+    assert_eq!(<f64 as Number>::from_i32(i32::MAX).to_i32(), 0x7fff_ff80);
+    assert_eq!(<f64 as Number>::from_u32(u32::MAX).to_u32(), 0xffff_ff00);
 }

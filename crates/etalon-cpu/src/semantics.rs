@@ -172,6 +172,16 @@
 //! shuffle or broadcast from an invocation that is not there or not active
 //! gives 0. A quad is four consecutive invocations.
 //!
+//! # Number types and checks
+//!
+//! All of this is said of [`NumberType::F32`](crate::NumberType::F32), which
+//! computes as devices do; the other types document how they differ. An `f16`
+//! is rounded to binary16 in every type.
+//!
+//! [`Checks`](crate::Checks) report what is defined here but seldom meant: an
+//! index that was brought into range, a division by zero, a shift by too much,
+//! a race. What is computed is the same with and without them.
+//!
 //! # What gives a typed error
 //!
 //! [`TranslateError::Unsupported`](crate::TranslateError::Unsupported), with

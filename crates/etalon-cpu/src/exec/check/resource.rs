@@ -47,7 +47,8 @@ fn locate(
         });
     }
     // Inside, so the index is below the number of texels, which has 32 bits.
-    Ok((third * height + at[1]) * width + at[0] + start)
+    let second = at.get(1).copied().unwrap_or(0);
+    Ok((third * height + second) * width + at[0] + start)
 }
 
 fn coordinates(at: &[u32], axes: usize, signed: bool) -> [i64; 3] {

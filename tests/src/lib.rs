@@ -1,10 +1,13 @@
-//! What the tests across backends share: executors, images compared, and every
-//! operation of WGSL with what it may give.
+//! What the tests across backends share: executors, images compared, every
+//! operation of WGSL with what it may give, and random programs.
 
 #![forbid(unsafe_code)]
 
+pub mod fuzz;
 pub mod operations;
+pub mod programs;
 
+#[cfg(feature = "devices")]
 use etalon::ash::{AshBackend, AshOptions, Validation};
 use etalon::backend::{Backend, BackendError, CapturedData, Execution};
 use etalon::graph::Graph;
@@ -36,8 +39,11 @@ pub fn executors() -> Vec<Box<dyn Backend>> {
         }
     };
     add("cpu", cpu());
-    add("wgpu", wgpu());
-    add("ash", ash());
+    #[cfg(feature = "devices")]
+    {
+        add("wgpu", wgpu());
+        add("ash", ash());
+    }
     executors
 }
 
@@ -55,6 +61,7 @@ pub fn cpu() -> Result<Box<dyn Backend>, BackendError> {
 ///
 /// # Errors
 /// If there is none.
+#[cfg(feature = "devices")]
 pub fn wgpu() -> Result<Box<dyn Backend>, BackendError> {
     Ok(Box::new(etalon::wgpu::WgpuBackend::new(
         &etalon::wgpu::WgpuOptions::default(),
@@ -68,6 +75,7 @@ pub fn wgpu() -> Result<Box<dyn Backend>, BackendError> {
 /// # Errors
 /// If there is no device, or no layer although `ETALON_REQUIRE` names
 /// `validation`.
+#[cfg(feature = "devices")]
 pub fn ash() -> Result<Box<dyn Backend>, BackendError> {
     let with = |validation| {
         let options = AshOptions {

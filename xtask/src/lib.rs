@@ -11,6 +11,7 @@ pub mod setup;
 pub mod size;
 pub mod test_backends;
 pub mod test_operations;
+pub mod test_programs;
 pub mod vectors;
 
 use std::path::PathBuf;
@@ -37,12 +38,16 @@ enum Task {
     CheckVectors(vectors::Options),
     /// Count the instructions the interpreter executes for each kernel.
     CountInstructions(instructions::Options),
+    TestPrograms(Box<test_programs::Options>),
     /// Run one job of test-backends.
     #[command(hide = true, name = test_backends::COMMAND)]
     Execute(execute::Job),
     /// Run every operation on one executor.
     #[command(hide = true, name = test_operations::COMMAND)]
     ExecuteOperations(test_operations::Job),
+    /// Try programs on one executor.
+    #[command(hide = true, name = test_programs::COMMAND)]
+    ExecutePrograms(test_programs::Job),
 }
 
 /// Runs the task that the command line asks for.
@@ -56,6 +61,9 @@ pub fn main() -> ExitCode {
         })),
         Task::TestOperations(options) => conclude(this_program().and_then(|program| {
             test_operations::run(&options, &program).map_err(|error| error.to_string())
+        })),
+        Task::TestPrograms(options) => conclude(this_program().and_then(|program| {
+            test_programs::run(&options, &program).map_err(|error| error.to_string())
         })),
         Task::BenchKernels(arguments) => {
             conclude(measure::run("kernels", &arguments).map_err(|error| error.to_string()))
@@ -73,6 +81,11 @@ pub fn main() -> ExitCode {
         ),
         Task::ExecuteOperations(job) => conclude(
             test_operations::execute(&job)
+                .map(|()| true)
+                .map_err(|error| error.to_string()),
+        ),
+        Task::ExecutePrograms(job) => conclude(
+            test_programs::execute(&job)
                 .map(|()| true)
                 .map_err(|error| error.to_string()),
         ),

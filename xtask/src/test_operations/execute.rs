@@ -225,3 +225,60 @@ fn save(folder: &Path, number: usize, words: &[u32]) -> Result<String, ResultsEr
     std::fs::write(&path, bytes).map_err(|source| ResultsError::Io { path, source })?;
     Ok(file)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_outcome_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let run = |results| OperationRun {
+            operation: "a + b, f32".into(),
+            strict: true,
+            results,
+        };
+        let words = [0, 1, 0x8000_0000, u32::MAX];
+        let file = save(folder.path(), 7, &words).unwrap();
+        let outcome = Outcome::Ran {
+            name: "ash/lavapipe".into(),
+            runs: vec![run(Ok(file)), run(Err("the device was lost".into()))],
+        };
+        outcome.write(folder.path()).unwrap();
+        assert_eq!(Outcome::read(folder.path()).unwrap(), outcome);
+        let Outcome::Ran { runs, .. } = outcome else {
+            panic!("{outcome:?}");
+        };
+        assert_eq!(runs[0].read(folder.path()), Ok(words.to_vec()));
+        assert_eq!(
+            runs[1].read(folder.path()),
+            Err("the device was lost".into())
+        );
+        std::fs::remove_file(folder.path().join("0007.words")).unwrap();
+        assert!(
+            runs[0]
+                .read(folder.path())
+                .unwrap_err()
+                .contains("0007.words")
+        );
+    }
+
+    #[test]
+    fn damage_is_reported_with_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = Outcome::read(folder.path()).unwrap_err();
+        assert!(matches!(missing, ResultsError::Io { .. }), "{missing}");
+        std::fs::write(folder.path().join(FILE), "{\"status\": \"ran\"}").unwrap();
+        let broken = Outcome::read(folder.path()).unwrap_err();
+        assert!(matches!(broken, ResultsError::Json { .. }), "{broken}");
+        assert!(broken.to_string().contains(FILE), "{broken}");
+    }
+
+    #[test]
+    fn operations_are_chosen_by_any_part_of_their_names() {
+        assert_eq!(chosen(Some("a + b, f32")).len(), 1);
+        assert!(chosen(Some("mat4x4")).len() > 3);
+        assert!(chosen(Some("no such thing")).is_empty());
+        assert!(chosen(None).len() > 200);
+    }
+}

@@ -20,7 +20,8 @@ pub struct Checks {
     /// Reads of memory that nothing wrote: workgroup memory, and arrays of
     /// functions and `var<private>` without an initial value, both of which WGSL
     /// fills with zeros ("Zero Value"); and words and texels of [`crate::Buffer::unwritten`] and
-    /// [`crate::Texture::unwritten`], which hold anything on a GPU.
+    /// [`crate::Texture::unwritten`], which hold anything on a GPU. Of filtered
+    /// reads those with offsets, derivatives or clamped coordinates are not looked into.
     pub uninitialised: bool,
     /// Two invocations of a workgroup use a word of workgroup or storage memory, or
     /// a texel of a storage texture, one of them writing it other than by an atomic

@@ -296,6 +296,18 @@ fn texels_that_nothing_wrote_are_found() {
             "nothing wrote a texel of `flat`",
         )),
     );
+    // A gather reads the same texels.
+    expect_on(
+        "value = /*!*/textureGather(0, flat, linear, vec2<f32>(0.5, (3.0 + f32(at.x) / 15.0) / 8.0)).x;",
+        half_written,
+        Some((
+            K::Uninitialised,
+            [1, 0, 0],
+            [0, 0, 0],
+            64,
+            "nothing wrote a texel of `flat`",
+        )),
+    );
     // What is outside of the texture is no memory; that is another check.
     let wgsl = kernel("value = textureLoad(flat, at + 16, 0).x;");
     let found = run_on(&wgsl, only(K::Uninitialised), half_written);

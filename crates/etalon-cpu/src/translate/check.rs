@@ -95,21 +95,29 @@ impl<'a> Translator<'a> {
         }
     }
 
-    /// That the layer that is sampled exists, and that something wrote the texels.
-    /// Operands are those of the sample.
-    pub(super) fn check_sample(&mut self, access: ImageAccess, sampler: u16, operands: &[Value]) {
-        let checks = self.checks();
-        if checks.bounds && access.layered {
-            let layer = operands[usize::from(access.coordinates)];
-            self.check(
-                Check::Layer {
-                    image: access.image,
-                },
-                &[layer],
-            );
+    /// That the layer that is sampled exists. Operands are coordinates and layer.
+    pub(super) fn check_layer(&mut self, access: ImageAccess, place: &[Value]) {
+        if let Some(&layer) = place.get(usize::from(access.coordinates))
+            && self.checks().bounds
+            && access.layered
+        {
+            let image = access.image;
+            self.check(Check::Layer { image }, &[layer]);
         }
-        if checks.uninitialised {
-            self.check(Check::SampleMemory { access, sampler }, operands);
+    }
+
+    /// That something wrote the texels that a sample or gather at a level of detail
+    /// reads, given coordinates and layer.
+    pub(super) fn check_sample(
+        &mut self,
+        access: ImageAccess,
+        sampler: u16,
+        place: &[Value],
+        lod: Value,
+    ) {
+        if self.checks().uninitialised {
+            let operands: Vec<Value> = place.iter().copied().chain([lod]).collect();
+            self.check(Check::SampleMemory { access, sampler }, &operands);
         }
     }
 

@@ -166,6 +166,14 @@ impl<'a> Translator<'a> {
             ));
         }
         let mut operands = self.coordinates(frame, access, coordinate, layer)?;
+        let signed = self.kind(frame, coordinate)? == ScalarKind::Sint;
+        self.check_texel(
+            access,
+            false,
+            signed,
+            Access::Atomic { reads: true },
+            &operands,
+        );
         operands.push(self.scalar(frame, value)?);
         self.builder
             .op(Op::ImageAtomic { access, function }, &operands, &[]);
@@ -197,11 +205,17 @@ impl<'a> Translator<'a> {
         let access = self.access(image, true)?;
         let offset = self.texel_offset(frame, access, offset)?;
         let mut operands = self.coordinates(frame, access, coordinate, array_index)?;
+        let place = operands.clone();
+        self.check_layer(access, &place);
         if let Some(reference) = depth_ref {
             operands.push(self.scalar(frame, reference)?);
         }
         if let Some(channel) = gather {
             let class = self.channel_class(image);
+            if offset == [0; 3] {
+                let zero = self.builder.float(0.0);
+                self.check_sample(access, sampler, &place, zero);
+            }
             return Ok(self.builder.op(
                 Op::ImageGather {
                     access,
@@ -245,8 +259,12 @@ impl<'a> Translator<'a> {
                 ));
             }
         }
-        if depth_ref.is_none() && !gradient && !clamp_to_edge && offset == [0; 3] {
-            self.check_sample(access, sampler, &operands);
+        if let Some(&lod) = operands.last()
+            && !gradient
+            && !clamp_to_edge
+            && offset == [0; 3]
+        {
+            self.check_sample(access, sampler, &place, lod);
         }
         let mut values = self.builder.op(
             Op::ImageSample {

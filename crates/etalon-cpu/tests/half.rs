@@ -125,9 +125,12 @@ fn evaluate(expressions: &[&str]) -> Vec<(u16, u16, Vec<u16>)> {
         .collect()
 }
 
+/// An expression, and what it is of two numbers.
+type Case = (&'static str, fn(f64, f64) -> f64);
+
 #[test]
 fn basic_operations_are_rounded_once() {
-    let cases: [(&str, fn(f64, f64) -> f64); 12] = [
+    let cases: [Case; 12] = [
         ("a + b", |a, b| a + b),
         ("a - b", |a, b| a - b),
         ("a * b", |a, b| a * b),
@@ -213,7 +216,7 @@ fn each_operation_of_a_function_is_rounded() {
 
 #[test]
 fn functions_are_within_a_unit_of_f64() {
-    let cases: [(&str, fn(f64, f64) -> f64); 18] = [
+    let cases: [Case; 18] = [
         ("sin(a)", |a, _| a.sin()),
         ("cos(a)", |a, _| a.cos()),
         ("tan(a)", |a, _| a.tan()),

@@ -970,7 +970,7 @@ fn cubes_are_read_across_edges_and_corners() {
         let (x, y) = (u * 4.0 - 0.5, v * 4.0 - 0.5);
         let (fx, fy) = (x - x.floor(), y - y.floor());
         let texels = around(&image, cube, on, x.floor() as i64, y.floor() as i64);
-        corners += u32::from((x < 0.0 || x > 3.0) && (y < 0.0 || y > 3.0));
+        corners += u32::from(!(0.0..=3.0).contains(&x) && !(0.0..=3.0).contains(&y));
         let want = (texels[0] * (1.0 - fx) + texels[1] * fx) * (1.0 - fy)
             + (texels[2] * (1.0 - fx) + texels[3] * fx) * fy;
         let got = f64::from(f32::from_bits(linear[4 * i]));

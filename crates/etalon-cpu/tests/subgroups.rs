@@ -140,9 +140,12 @@ fn simulate(x: &[u32], active: &[bool], lane: usize, size: usize) -> Vec<u32> {
     ]
 }
 
+/// An expression, and whether it holds for an invocation with a value.
+type Condition = (&'static str, fn(usize, u32) -> bool);
+
 #[test]
 fn every_operation_is_the_simulation() {
-    let conditions: [(&str, fn(usize, u32) -> bool); 3] = [
+    let conditions: [Condition; 3] = [
         ("true", |_, _| true),
         ("i % 3u != 1u", |i, _| i % 3 != 1),
         ("(x & 8u) == 0u", |_, x| x & 8 == 0),

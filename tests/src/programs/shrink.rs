@@ -192,9 +192,9 @@ impl Editor {
             } => vec![body, continuing],
             _ => return false,
         };
-        for part in 0..parts.len() {
+        for part in parts {
             if self.now(Edits::Statements) {
-                let part = parts[part].clone();
+                let part = part.clone();
                 block.splice(index..=index, part);
                 return true;
             }

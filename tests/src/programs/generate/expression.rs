@@ -168,12 +168,12 @@ impl Generator<'_> {
                     ]);
                     return expr(ty, ExprKind::Input(input));
                 }
-                6 => match ty {
-                    &U32 => {
+                6 => match *ty {
+                    U32 => {
                         let index = self.any_u32();
                         return expr(ty, ExprKind::Data(Box::new(index)));
                     }
-                    &F32 => {
+                    F32 => {
                         let index = self.any_u32();
                         return expr(ty, ExprKind::Reals(Box::new(index)));
                     }

@@ -37,7 +37,7 @@ fn programs_agree_and_nothing_is_kept() {
 #[test]
 fn a_planted_fault_is_found_shrunk_and_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let output = test_programs(folder.path(), &["--plant", "cpu: + => - "]);
+    let output = test_programs(folder.path(), &["--plant", "cpu: * => + "]);
     let text = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(1), "{text}");
     assert!(
@@ -58,7 +58,7 @@ fn a_planted_fault_is_found_shrunk_and_kept() {
         }
         kept += 1;
         // The fault is in what is left, and there is little of it.
-        assert!(trial.wgsl.contains(" + "), "{text}");
+        assert!(trial.wgsl.contains(" * "), "{text}");
         assert!(trial.wgsl.lines().count() < 40, "{text}");
     }
     assert!(kept > 0);

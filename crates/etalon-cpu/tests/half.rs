@@ -73,10 +73,21 @@ fn run(wgsl: &str, data: &[u8], bytes: u64, workgroups: u32) -> Vec<u8> {
             .dispatch(&executor, [workgroups, 1, 1], &bound)
             .unwrap_or_else(|error| panic!("{error}\n{program}"));
         let got = result.to_bytes().unwrap();
-        assert!(first.as_ref().is_none_or(|first| *first == got), "{name}");
+        let same = first.as_ref().is_none_or(|first| {
+            first.len() == got.len()
+                && halves(first).iter().zip(halves(&got)).all(|(&a, b)| {
+                    // The sign and payload of a NaN are nobody's promise.
+                    a == b || is_nan(a) && is_nan(b)
+                })
+        });
+        assert!(same, "{name}");
         first = Some(got);
     }
     first.unwrap()
+}
+
+fn is_nan(half: u16) -> bool {
+    half & 0x7fff > 0x7c00
 }
 
 fn halves(bytes: &[u8]) -> Vec<u16> {

@@ -185,6 +185,21 @@ impl Code {
         Ok(code)
     }
 
+    /// Whether invocations may go apart in a loop, or leave it one by one.
+    pub(crate) fn has_divergent_loop(&self) -> bool {
+        self.blocks.iter().enumerate().any(|(last, block)| {
+            let End::Again { head, .. } = block.end else {
+                return false;
+            };
+            let of_lanes = |block: &CodeBlock| match block.end {
+                End::Any { mask, .. } => mask.varying,
+                _ => false,
+            };
+            let body = self.blocks.get(head as usize..=last);
+            body.is_some_and(|body| body.iter().any(of_lanes))
+        })
+    }
+
     /// Whether results may depend on the order in which workgroups run: an
     /// atomic operation's old value is used, or one that does not commute.
     pub(crate) fn depends_on_order(&self) -> bool {

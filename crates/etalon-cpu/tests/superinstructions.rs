@@ -44,10 +44,11 @@ const PAIRS: &[Pair] = &[
     pair("f32", "f32", "a + b", "c + t", "add3.f"),
     pair("f32", "f32", "a + b", "t * c", "addmul.f"),
     pair("f32", "f32", "a - b", "c * t", "submulby.f"),
-    pair("f32", "f32", "max(a, b)", "min(t, c)", "clamp.f"),
+    pair("f32", "f32", "max(a, 0.0)", "min(t, 1.0)", "clamp.f"),
+    pair("f32", "f32", "max(a, -0.0)", "min(t, 0.0)", "clamp.f"),
     pair("f32", "f32", "max(a, b)", "max(t, c)", "max3.f"),
-    pair("f32", "f32", "a * b", "min(t, c)", "mulmin.f"),
-    pair("f32", "f32", "a + b", "max(t, c)", "addmax.f"),
+    pair("f32", "f32", "a * b", "min(t, 65504.0)", "mulatmost.f"),
+    pair("f32", "f32", "a + b", "max(t, 0.0)", "addatleast.f"),
     pair("f32", "f32", "a * b", "select(c, t, d < c)", "selectmul.f"),
     pair(
         "f32",
@@ -223,6 +224,61 @@ fn joined_instructions_compute_what_they_do_apart() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// A limit that is known to be a number, and the same one read from memory.
+#[test]
+fn known_limits_are_those_of_any_number() {
+    let limits = [
+        0.0_f32,
+        -0.0,
+        1.0,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        65504.0,
+    ];
+    let values: Vec<f32> = limits
+        .into_iter()
+        .chain([f32::NAN, -1.0, 2.0, 1e-40, f32::MAX, f32::MIN])
+        .collect();
+    for limit in limits.into_iter().filter(|limit| limit.is_finite()) {
+        let wgsl = format!(
+            "@group(0) @binding(0) var<storage> data: array<f32>;
+             @group(0) @binding(1) var<storage, read_write> result: array<u32>;
+             @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+                 let value = data[id.x % {count}u + 1u];
+                 result[id.x * 4u] = bitcast<u32>(max(value, {limit:?}f));
+                 result[id.x * 4u + 1u] = bitcast<u32>(max(value, data[0]));
+                 result[id.x * 4u + 2u] = bitcast<u32>(min(value, {limit:?}f));
+                 result[id.x * 4u + 3u] = bitcast<u32>(min(value, data[0]));
+             }}",
+            count = values.len()
+        );
+        let data: Vec<u32> = std::iter::once(&limit)
+            .chain(&values)
+            .map(|value| value.to_bits())
+            .collect();
+        let listing = program(&wgsl).to_string();
+        assert!(
+            listing.contains("atleast.f") && listing.contains("max.f"),
+            "{listing}"
+        );
+        for (k, four) in run_buffers(&wgsl, &data, 256, 1).chunks(4).enumerate() {
+            let value = values[k % values.len()];
+            assert_eq!(four[0], four[1], "max({value:?}, {limit:?})");
+            assert_eq!(four[2], four[3], "min({value:?}, {limit:?})");
+            let expected = if value.is_nan() {
+                limit
+            } else {
+                value.max(limit)
+            };
+            assert_eq!(
+                f32::from_bits(four[0]),
+                expected,
+                "max({value:?}, {limit:?})"
+            );
         }
     }
 }

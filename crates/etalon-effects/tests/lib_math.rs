@@ -9,7 +9,7 @@ use etalon_core::resource::TextureDesc;
 /// Applies one of the functions to (x, y) pairs.
 const KERNEL: &str = "
 import package::lib::colour::{srgb_decoded1, srgb_encoded1};
-import package::lib::math::{approach, exponential, exponential2, lerp, logarithm, logarithm2, power, smooth01};
+import package::lib::math::{approach, exponential, exponential2, fraction_power, lerp, logarithm, logarithm2, power, smooth01};
 
 override FUNCTION: u32 = 0u;
 
@@ -27,6 +27,7 @@ fn value(x: f32, y: f32) -> f32 {
         case 6u: { return srgb_encoded1(x); }
         case 7u: { return srgb_decoded1(x); }
         case 8u: { return smooth01(x); }
+        case 9u: { return fraction_power(x, y); }
         default: { return lerp(x, y, 1.0); }
     }
 }
@@ -51,7 +52,8 @@ const APPROACH: u32 = 5;
 const SRGB_ENCODED: u32 = 6;
 const SRGB_DECODED: u32 = 7;
 const SMOOTH01: u32 = 8;
-const LERP_AT_ONE: u32 = 9;
+const FRACTION_POWER: u32 = 9;
+const LERP_AT_ONE: u32 = 10;
 
 /// Values of a function at `points`.
 fn evaluate(function: u32, points: &[[f32; 2]]) -> Vec<f32> {
@@ -194,10 +196,11 @@ fn the_lag_keeps_its_digits_for_short_times() {
 
 #[test]
 fn srgb() {
-    // Encoding: 2 ulp of the power, scaled by 1.055 and rounded twice more; the
-    // difference then loses at most a bit, since it is over half of its minuend
-    // from 0.0031308 on where 0.095 - 0.055 = 0.04, which loses 1.3 bits:
-    // (2 + 0.5 + 0.5) · 2.4 + 0.5 = 7.7.
+    // Encoding: from 0.0031308 on the logarithm is below 2^4 and its product with
+    // 1/2.4 below 4, so that the power's exponent is off by up to 2^-21 / 2.4 +
+    // 2^-23, and the power by ln 2 of that, 2.9 ulp where it is next to 0.1, and
+    // its own 1.25. The factor 1.055 and two roundings make 4.9 of that; the ulp
+    // of 0.1055 - 0.055 is half as large. (2.9 + 1.25) · 1.055 · 2 + 1 + 0.5 = 10.3.
     let encoded = |x: f64| {
         if x <= 0.003_130_8_f32.into() {
             12.92 * x
@@ -205,15 +208,14 @@ fn srgb() {
             1.055 * x.powf(1.0 / 2.4) - 0.055
         }
     };
-    // The exponent 1/2.4 as f32 is off by 2^-26 of itself, which the exact
-    // function does not see: log2(x) · 2^-26 of 8.3 adds at most 1.
+    // (The exponent 1/2.4 as f32 is off by 2^-26 of itself: a tenth of that.)
     let points = unary(spread(1e-6, 1.0, DENSE));
     within(
         "srgb_encoded1",
         SRGB_ENCODED,
         &points,
         |x, _| encoded(x),
-        8.0,
+        10.3,
     );
     // Decoding: the argument within 1 ulp, times 2.4 by the power, and its own 2.
     let decoded = |x: f64| {
@@ -229,6 +231,54 @@ fn srgb() {
         &points,
         |x, _| decoded(x),
         7.0,
+    );
+}
+
+#[test]
+fn powers_of_fractions() {
+    let exact = |x: f64, y: f64| x.powf(y);
+    // The logarithm's sum with its exponent, below 2^k, rounds by 2^(k - 25), and
+    // the product with y, below 2^j, by 2^(j - 25) unless y = 1. The result is off
+    // by ln 2 of what they make of the power, in ulp of at least 2^-24 of it, and
+    // by the 1.25 ulp of 2^x.
+    let points = |from: f64, y: f32| -> Vec<[f32; 2]> {
+        let points = spread(from as f32, 1.0, DENSE).into_iter();
+        points.map(|x| [x, y]).collect()
+    };
+    let cases = [
+        // (2^(3 - 25) / 2 + 2^(2 - 25)) ln 2 = 2.8 · 2^-24.
+        (2.0_f64.powi(-8), 0.416_666_66_f32, 4.0),
+        (2.0_f64.powi(-8), 0.5, 4.0),
+        // 2^(2 - 25) ln 2 = 1.4 · 2^-24.
+        (2.0_f64.powi(-4), 1.0, 2.6),
+        // 2^(5 - 25) ln 2 = 11.1 · 2^-24.
+        (2.0_f64.powi(-32), 1.0, 12.4),
+        // Twice that.
+        (2.0_f64.powi(-64), 0.5, 23.5),
+    ];
+    for (from, y, ulp) in cases {
+        within(
+            "fraction_power",
+            FRACTION_POWER,
+            &points(from, y),
+            exact,
+            ulp,
+        );
+    }
+    // Whole powers at the ends, and something in [0, 1] for 0.
+    let ends = [
+        [1.0, 0.3],
+        [1.0, 0.0],
+        [0.25, 0.0],
+        [0.25, 0.5],
+        [0.0, 0.4],
+        [0.0, 1.0],
+    ];
+    let got = evaluate(FRACTION_POWER, &ends);
+    assert_eq!(got[..4], [1.0, 1.0, 1.0, 0.5]);
+    assert!(
+        got[4..].iter().all(|power| (0.0..=1.0).contains(power)),
+        "{got:?}"
     );
 }
 

@@ -104,7 +104,7 @@ fn memory_of_invocations_is_counted() {
         .unwrap();
     let mut backend = CpuBackend::new(&CpuOptions {
         threads: 1,
-        lanes: 1024,
+        lanes: Some(1024),
         ..CpuOptions::default()
     })
     .unwrap();

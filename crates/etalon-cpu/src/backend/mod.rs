@@ -33,8 +33,8 @@ pub struct CpuOptions {
     /// Instruction set; the best one there is without it. Results do not depend
     /// on it.
     pub tier: Option<Tier>,
-    /// See [`Executor::with_lanes`].
-    pub lanes: u32,
+    /// See [`Executor::with_lanes`]; chosen for each kernel without it.
+    pub lanes: Option<u32>,
     /// See [`Executor::with_max_trips`].
     pub max_trips: u32,
     /// See [`Executor::with_profile`].
@@ -53,7 +53,7 @@ impl Default for CpuOptions {
         Self {
             threads: 0,
             tier: None,
-            lanes: Executor::DEFAULT_LANES,
+            lanes: None,
             max_trips: Executor::DEFAULT_MAX_TRIPS,
             profile: false,
             number_type: NumberType::F32,
@@ -84,8 +84,11 @@ impl CpuBackend {
             backend: "cpu",
             reason: error.to_string(),
         })?;
+        let executor = match options.lanes {
+            Some(lanes) => executor.with_lanes(lanes),
+            None => executor,
+        };
         let executor = executor
-            .with_lanes(options.lanes)
             .with_max_trips(options.max_trips)
             .with_profile(options.profile)
             .with_number_type(options.number_type)

@@ -22,7 +22,7 @@ pub struct Executor {
     pool: rayon::ThreadPool,
     tier: Tier,
     number_type: NumberType,
-    batch: u32,
+    lanes: Option<u32>,
     max_trips: u32,
     profile: bool,
     subgroup_size: u32,
@@ -42,10 +42,14 @@ impl Executor {
     /// texels of a 4096² image, and minutes rather than hours of work.
     pub const DEFAULT_MAX_TRIPS: u32 = 1 << 24;
 
-    /// Default for [`Executor::with_lanes`]: enough to make calling an
-    /// instruction cheap beside its work, and the registers of most kernels
-    /// still fit a core's nearest cache.
-    pub const DEFAULT_LANES: u32 = 128;
+    /// Lanes that run together by default: enough to make calling an instruction
+    /// cheap beside its work, and the registers of most kernels still fit a
+    /// core's nearest cache.
+    pub const DEFAULT_LANES: u32 = 256;
+
+    /// The same for kernels with loops that invocations may leave at different
+    /// times: there all lanes wait for the last.
+    pub const LANES_OF_DIVERGENT_LOOPS: u32 = 128;
 
     /// Default for [`Executor::with_subgroup_size`].
     pub const DEFAULT_SUBGROUP_SIZE: u32 = 32;
@@ -66,7 +70,7 @@ impl Executor {
             pool,
             tier: Tier::best(),
             number_type: NumberType::F32,
-            batch: Self::DEFAULT_LANES,
+            lanes: None,
             max_trips: Self::DEFAULT_MAX_TRIPS,
             profile: false,
             subgroup_size: Self::DEFAULT_SUBGROUP_SIZE,
@@ -89,10 +93,12 @@ impl Executor {
 
     /// The most lanes that run together, rounded up to a multiple of 64: a part
     /// of a workgroup, or several workgroups. Workgroups whose invocations share
-    /// memory or meet at barriers always run whole, and one at a time.
+    /// memory or meet at barriers always run whole, and one at a time. Without
+    /// this it is [`Executor::DEFAULT_LANES`], or
+    /// [`Executor::LANES_OF_DIVERGENT_LOOPS`]. Results do not depend on it.
     #[must_use]
     pub fn with_lanes(mut self, lanes: u32) -> Self {
-        self.batch = lanes.clamp(1, 1 << 16).next_multiple_of(LANES as u32);
+        self.lanes = Some(lanes.clamp(1, 1 << 16).next_multiple_of(LANES as u32));
         self
     }
 
@@ -249,7 +255,14 @@ impl<N: Number> Job<'_, N> {
         let &Shared { total, share, .. } = shared;
         // A batch is a part of a workgroup, or several of them.
         let all_chunks = self.local_ids.active.len();
-        let batch = executor.batch as usize / LANES;
+        let lanes = executor.lanes.unwrap_or_else(|| {
+            if self.code.has_divergent_loop() {
+                Executor::LANES_OF_DIVERGENT_LOOPS
+            } else {
+                Executor::DEFAULT_LANES
+            }
+        });
+        let batch = lanes as usize / LANES;
         let (most, together) = if !self.code.independent {
             (all_chunks, 1)
         } else if all_chunks >= batch {

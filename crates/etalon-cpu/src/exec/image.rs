@@ -90,12 +90,12 @@ pub(super) fn addresses<N: Number, const K: usize>(
     level: Option<Slot>,
     chunk: usize,
 ) -> [u32; K] {
-    let (x, y) = (
-        state.ints(operands[0], chunk),
-        state.ints(operands[1], chunk),
-    );
-    let z: Option<[u32; K]> =
-        (access.coordinates == 3 || access.layered).then(|| state.ints(operands[2], chunk));
+    let mut splats = [[0; K]; 3];
+    let [x, y, z] = &mut splats;
+    let x = state.ints_in(operands[0], chunk, x);
+    let y = state.ints_in(operands[1], chunk, y);
+    let z =
+        (access.coordinates == 3 || access.layered).then(|| &*state.ints_in(operands[2], chunk, z));
     let mut out = [OUTSIDE; K];
     match level {
         Some(level) if level.varying => {
@@ -117,7 +117,7 @@ pub(super) fn addresses<N: Number, const K: usize>(
         level => {
             let level: [u32; 1] = level.map_or([0], |level| state.ints(level, chunk));
             if let Some(&level) = texture.levels.get(level[0] as usize) {
-                locate(level, &x, &y, z.as_ref(), &mut out);
+                locate(level, x, y, z, &mut out);
             }
         }
     }
@@ -193,7 +193,7 @@ impl<N: Number> TieredStep<N> for Store {
             let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
             put::<I, LANES>(texture, &index, &channels);
             if let (true, Some(wide)) = (N::WIDE, texture.wide) {
-                wide::store(state, wide, texture.desc().format, &index, value, chunk);
+                wide::store::<I, N>(state, wide, texture.desc().format, &index, value, chunk);
             }
         }
     }

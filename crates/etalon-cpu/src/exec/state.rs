@@ -131,6 +131,23 @@ impl<'a, N: Number> State<'a, N> {
         }
     }
 
+    /// [`State::ints`] where they are; of a uniform number `K` times in `splat`.
+    #[inline(always)]
+    pub(crate) fn ints_in<'s, const K: usize>(
+        &'s self,
+        slot: Slot,
+        chunk: usize,
+        splat: &'s mut [u32; K],
+    ) -> &'s [u32; K] {
+        if slot.varying {
+            let lanes = &self.registers.ints[self.at(slot.number, chunk)].0;
+            lanes.first_chunk().unwrap_or(splat)
+        } else {
+            *splat = [self.registers.uniform_ints[usize::from(slot.number)]; K];
+            splat
+        }
+    }
+
     /// The numbers of `K` lanes, or `K` times a uniform one.
     #[inline(always)]
     pub(crate) fn floats<const K: usize>(&self, slot: Slot, chunk: usize) -> [N; K] {

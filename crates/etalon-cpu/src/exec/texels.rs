@@ -8,7 +8,7 @@ use etalon_core::Format;
 
 use super::isa::Isa;
 use super::lanes::BLOCK;
-use crate::memory::{Channels, Texels, TextureView, decode, encode, unorm8};
+use crate::memory::{Channels, Texels, TextureView, decode, encode, unorm8, unorm8_codes};
 use crate::num::{f16_to_f32, f32_to_f16};
 
 /// Stands for a texel outside: no texture has so many.
@@ -68,17 +68,23 @@ fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] 
     bits
 }
 
-/// Loops over blocks of lanes with gathers where all indices allow that.
-macro_rules! gathered {
-    ($name:ident, $atomic:ty, $bits:ty, $gather:ident) => {
-        /// [`load`] by the instruction set's gathers.
+/// Whether blocks of these indices can be reached by address: instruction sets
+/// take signed ones.
+#[inline(always)]
+fn in_blocks<W, const K: usize>(words: &[W], index: &[u32; K]) -> bool {
+    K % BLOCK == 0 && words.len() <= i32::MAX as usize && all_inside(words, index, 1)
+}
+
+/// [`load`] and [`store`] as the instruction set has them.
+macro_rules! in_words {
+    ($load:ident, $store:ident, $atomic:ty, $bits:ty) => {
+        /// The words at `index`, zero outside.
         #[inline(always)]
-        pub(super) fn $name<I: Isa, const K: usize>(
+        pub(super) fn $load<I: Isa, const K: usize>(
             words: &[$atomic],
             index: &[u32; K],
         ) -> [$bits; K] {
-            // Gathers take signed indices.
-            if K % BLOCK != 0 || words.len() > i32::MAX as usize || !all_inside(words, index, 1) {
+            if !in_blocks(words, index) {
                 return load(words, index);
             }
             let mut bits = [0; K];
@@ -87,15 +93,34 @@ macro_rules! gathered {
             for (index, bits) in from.iter().zip(to) {
                 // SAFETY: all indices were seen to be inside, and atomics are
                 // laid out as what they hold.
-                *bits = unsafe { I::$gather(words.as_ptr().cast(), *index) };
+                *bits = unsafe { I::$load(words.as_ptr().cast(), words.len(), *index) };
             }
             bits
+        }
+
+        /// Writes the words at `index`, those inside.
+        #[inline(always)]
+        pub(super) fn $store<I: Isa, const K: usize>(
+            words: &[$atomic],
+            index: &[u32; K],
+            bits: &[$bits; K],
+        ) {
+            if !in_blocks(words, index) {
+                return store(words, index, bits);
+            }
+            let (to, _) = index.as_chunks::<BLOCK>();
+            let (from, _) = bits.as_chunks::<BLOCK>();
+            for (index, bits) in to.iter().zip(from) {
+                // SAFETY: all indices were seen to be inside; atomics may be
+                // written behind shared references, and others use them as words.
+                unsafe { I::$store(words.as_ptr().cast_mut().cast(), *index, *bits) };
+            }
         }
     };
 }
 
-gathered!(load4, AtomicU32, u32, gather4);
-gathered!(load8, AtomicU64, u64, gather8);
+in_words!(load4, store4, AtomicU32, u32);
+in_words!(load8, store8, AtomicU64, u64);
 
 /// [`load`] where a texel has two words.
 #[inline(always)]
@@ -123,7 +148,7 @@ fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K
 
 /// Writes the words at `index`, those inside.
 #[inline(always)]
-pub(super) fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
+fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits: &[W::Bits; K]) {
     if all_inside(words, index, 1) {
         for k in 0..K {
             // SAFETY: all indices were seen to be inside.
@@ -138,9 +163,9 @@ pub(super) fn store<W: Word, const K: usize>(words: &[W], index: &[u32; K], bits
     }
 }
 
-/// Values of binary16 in the low halves of words.
+/// Values of binary16, as bits.
 #[inline(always)]
-fn from_halves<I: Isa, const K: usize>(bits: &[u32; K], out: &mut [u32; K]) {
+fn from_halves<I: Isa, const K: usize>(bits: &[u16; K], out: &mut [u32; K]) {
     let (blocks, rest) = bits.as_chunks::<BLOCK>();
     let (to, last) = out.as_chunks_mut::<BLOCK>();
     for (block, to) in blocks.iter().zip(to) {
@@ -150,13 +175,13 @@ fn from_halves<I: Isa, const K: usize>(bits: &[u32; K], out: &mut [u32; K]) {
         }
     }
     for (bits, to) in rest.iter().zip(last) {
-        *to = f16_to_f32(bits & 0xffff).to_bits();
+        *to = f16_to_f32(u32::from(*bits)).to_bits();
     }
 }
 
 /// The binary16 nearest to values, given as bits.
 #[inline(always)]
-fn to_halves<I: Isa, const K: usize>(values: &[u32; K]) -> [u32; K] {
+fn to_halves<I: Isa, const K: usize>(values: &[u32; K]) -> [u16; K] {
     let mut out = [0; K];
     let (blocks, rest) = values.as_chunks::<BLOCK>();
     let (to, last) = out.as_chunks_mut::<BLOCK>();
@@ -168,9 +193,77 @@ fn to_halves<I: Isa, const K: usize>(values: &[u32; K]) -> [u32; K] {
         *to = I::to_halves(values);
     }
     for (bits, to) in rest.iter().zip(last) {
-        *to = f32_to_f16(f32::from_bits(*bits));
+        *to = f32_to_f16(f32::from_bits(*bits)) as u16;
     }
     out
+}
+
+/// The wanted channels of texels of four binary16.
+#[inline(always)]
+fn fetch_halves<I: Isa, const K: usize>(
+    texels: &[AtomicU64],
+    index: &[u32; K],
+    wanted: [bool; 4],
+    out: &mut Channels<K>,
+) {
+    if !in_blocks(texels, index) {
+        let word = load(texels, index);
+        for channel in 0..4 {
+            let mut bits = [0; K];
+            for k in 0..K {
+                bits[k] = (word[k] >> (16 * channel)) as u16;
+            }
+            if wanted[channel] {
+                from_halves::<I, K>(&bits, &mut out[channel]);
+            }
+        }
+        return;
+    }
+    let (blocks, _) = index.as_chunks::<BLOCK>();
+    for (block, index) in blocks.iter().enumerate() {
+        // SAFETY: all indices were seen to be inside, and atomics are laid out
+        // as what they hold.
+        let words = unsafe { I::load8(texels.as_ptr().cast(), texels.len(), *index) };
+        let parts = I::split(words);
+        for channel in 0..4 {
+            if wanted[channel] {
+                let values = I::from_halves(parts[channel]);
+                let to = &mut out[channel][block * BLOCK..][..BLOCK];
+                for k in 0..BLOCK {
+                    to[k] = values[k].to_bits();
+                }
+            }
+        }
+    }
+}
+
+/// Writes texels of four binary16.
+#[inline(always)]
+fn put_halves<I: Isa, const K: usize>(
+    texels: &[AtomicU64],
+    index: &[u32; K],
+    channels: &Channels<K>,
+) {
+    let mut words = [0; K];
+    let mut halves = [[0; K]; 4];
+    for (halves, channel) in halves.iter_mut().zip(channels) {
+        *halves = to_halves::<I, K>(channel);
+    }
+    let (to, rest) = words.as_chunks_mut::<BLOCK>();
+    for (block, to) in to.iter_mut().enumerate() {
+        let mut parts = [[0; BLOCK]; 4];
+        for (part, halves) in parts.iter_mut().zip(&halves) {
+            part.copy_from_slice(&halves[block * BLOCK..][..BLOCK]);
+        }
+        *to = I::join(parts);
+    }
+    let first = K - rest.len();
+    for (k, word) in rest.iter_mut().enumerate() {
+        for (part, halves) in halves.iter().enumerate() {
+            *word |= u64::from(halves[first + k]) << (16 * part);
+        }
+    }
+    store8::<I, K>(texels, index, &words);
 }
 
 /// `$out[c] = $channel` for each channel that is wanted.
@@ -210,12 +303,7 @@ pub(super) fn fetch<I: Isa, const K: usize>(
     // The channels that the loops below decode; the others are 0, 0, 1.
     let decoded = match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            let word = load8::<I, K>(texels, index);
-            halves!(wanted, out,
-                0: |k| word[k] as u32,
-                1: |k| word[k] as u32 >> 16,
-                2: |k| (word[k] >> 32) as u32,
-                3: |k| (word[k] >> 48) as u32);
+            fetch_halves::<I, K>(texels, index, wanted, out);
             4
         }
         (Texels::B4(texels), Format::Rgba8Unorm) => {
@@ -238,12 +326,12 @@ pub(super) fn fetch<I: Isa, const K: usize>(
         }
         (Texels::B4(texels), Format::Rg16Float) => {
             let word = load4::<I, K>(texels, index);
-            halves!(wanted, out, 0: |k| word[k], 1: |k| word[k] >> 16);
+            halves!(wanted, out, 0: |k| word[k] as u16, 1: |k| (word[k] >> 16) as u16);
             2
         }
         (Texels::B2(texels), Format::R16Float) => {
             let word = load(texels, index);
-            halves!(wanted, out, 0: |k| word[k].into());
+            halves!(wanted, out, 0: |k| word[k]);
             1
         }
         (Texels::B8(texels), Format::Rg32Float | Format::Rg32Uint | Format::Rg32Sint) => {
@@ -306,24 +394,15 @@ pub(super) fn put<I: Isa, const K: usize>(
     let format = texture.desc().format;
     match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            // No closure here: it would not be compiled for the instruction set.
-            let (r, g) = (
-                to_halves::<I, K>(&channels[0]),
-                to_halves::<I, K>(&channels[1]),
-            );
-            let (b, a) = (
-                to_halves::<I, K>(&channels[2]),
-                to_halves::<I, K>(&channels[3]),
-            );
+            put_halves::<I, K>(texels, index, channels);
+        }
+        (Texels::B4(texels), Format::Rgba8Unorm) => {
             let mut word = [0; K];
-            for k in 0..K {
-                let (low, high) = (r[k] | g[k] << 16, b[k] | a[k] << 16);
-                word[k] = u64::from(low) | u64::from(high) << 32;
-            }
-            store(texels, index, &word);
+            unorm8_codes(channels, &mut word);
+            store4::<I, K>(texels, index, &word);
         }
         (Texels::B4(texels), Format::R32Float | Format::R32Uint | Format::R32Sint) => {
-            store(texels, index, &channels[0]);
+            store4::<I, K>(texels, index, &channels[0]);
         }
         _ => {
             let mut words = [[0; K]; 2];
@@ -332,8 +411,8 @@ pub(super) fn put<I: Isa, const K: usize>(
             match texture.texels {
                 Texels::B1(texels) => store(texels, index, &low.map(|word| word as u8)),
                 Texels::B2(texels) => store(texels, index, &low.map(|word| word as u16)),
-                Texels::B4(texels) => store(texels, index, &low.map(|word| word as u32)),
-                Texels::B8(texels) => store(texels, index, &low),
+                Texels::B4(texels) => store4::<I, K>(texels, index, &low.map(|word| word as u32)),
+                Texels::B8(texels) => store8::<I, K>(texels, index, &low),
                 Texels::B16(texels) => {
                     for k in 0..K {
                         let at = index[k] as usize * 2;

@@ -122,13 +122,13 @@ impl<N: Number> Handler<N> {
             Tier::Avx512 => avx512::<N, Told<S, isa::Avx512>>,
             #[cfg(target_arch = "x86_64")]
             Tier::Avx2 => avx2::<N, Told<S, isa::Avx2>>,
-            _ => S::run::<isa::Portable>,
+            _ => S::run::<isa::Baseline>,
         })
     }
 
     /// A step that is told the instruction set, for the baseline only.
     pub(super) fn portable<S: TieredStep<N>>() -> Self {
-        Self(S::run::<isa::Portable>)
+        Self(S::run::<isa::Baseline>)
     }
 
     /// The step for the baseline.

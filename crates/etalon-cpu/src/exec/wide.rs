@@ -66,7 +66,7 @@ pub(super) fn load<I: Isa, N: Number, const K: usize>(
 
 /// Stores channels in the wide plane, where the index is inside.
 #[inline(always)]
-pub(super) fn store<N: Number>(
+pub(super) fn store<I: Isa, N: Number>(
     state: &State<'_, N>,
     wide: &WideTexels,
     format: Format,
@@ -87,6 +87,6 @@ pub(super) fn store<N: Number>(
         for k in 0..LANES {
             bits[k] = value[k].to_bits();
         }
-        texels::store(wide.words(), &at, &bits);
+        texels::store8::<I, LANES>(wide.words(), &at, &bits);
     }
 }

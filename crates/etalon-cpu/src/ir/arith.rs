@@ -150,6 +150,9 @@ instructions! {
     RemF "rem.f" (a: Float, b: Float) -> Float = a.rem(b);
     MinF "min.f" (a: Float, b: Float) -> Float = a.min(b);
     MaxF "max.f" (a: Float, b: Float) -> Float = a.max(b);
+    // The same where the second operand is known to be a number.
+    AtMostF "atmost.f" (a: Float, b: Float) -> Float = a.at_most(b);
+    AtLeastF "atleast.f" (a: Float, b: Float) -> Float = a.at_least(b);
     PowF "pow.f" (a: Float, b: Float) -> Float = a.pow(b);
     Atan2F "atan2.f" (a: Float, b: Float) -> Float = a.atan2(b);
     LdexpF "ldexp.f" (a: Float, b: Int) -> Float = a.ldexp(s(b));
@@ -233,11 +236,11 @@ instructions! {
 
     // Superinstructions: what `lower::fuse` makes of others that follow each
     // other. Each rounds wherever those do.
-    ClampF "clamp.f" (a: Float, b: Float, c: Float) -> Float = a.max(b).min(c);
+    ClampF "clamp.f" (a: Float, b: Float, c: Float) -> Float = a.at_least(b).at_most(c);
     Max3F "max3.f" (a: Float, b: Float, c: Float) -> Float = a.max(b).max(c);
     Add3F "add3.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).add(c);
-    MulMinF "mulmin.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).min(c);
-    AddMaxF "addmax.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).max(c);
+    MulAtMostF "mulatmost.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).at_most(c);
+    AddAtLeastF "addatleast.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).at_least(c);
     AddMulF "addmul.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).mul(c);
     SubMulByF "submulby.f" (a: Float, b: Float, c: Float) -> Float = a.sub(b).mul(c);
     MulMulAddF "mulmuladd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = c.mul(e).add(a.mul(b));
@@ -322,6 +325,8 @@ impl Arith {
                     | Self::RoundF
                     | Self::MinF
                     | Self::MaxF
+                    | Self::AtMostF
+                    | Self::AtLeastF
                     | Self::SelectF
                     | Self::BitsToF
                     | Self::HalfToF

@@ -43,10 +43,10 @@ const RULES: &[Rule] = &{
         rule(SubF, MulF, 0, SubMulByF),
         rule(SubF, MulF, 1, SubMulByF),
         // Limits.
-        rule(MaxF, MinF, 0, ClampF),
+        rule(AtLeastF, AtMostF, 0, ClampF),
         rule(MaxF, MaxF, 0, Max3F),
-        rule(MulF, MinF, 0, MulMinF),
-        rule(AddF, MaxF, 0, AddMaxF),
+        rule(MulF, AtMostF, 0, MulAtMostF),
+        rule(AddF, AtLeastF, 0, AddAtLeastF),
         rule(MulF, SelectF, 1, SelectMulF),
         rule(MaxS, MinS, 1, ClampS),
         rule(MaxS, MinS, 0, ClampS),
@@ -80,6 +80,7 @@ const RULES: &[Rule] = &{
 };
 
 pub(super) fn superinstructions(flat: &mut Flat) {
+    know_limits(flat);
     let mut fuser = Fuser {
         uses: uses(flat),
         varying: flat.regs.iter().map(|reg| reg.varying).collect(),
@@ -87,6 +88,24 @@ pub(super) fn superinstructions(flat: &mut Flat) {
     };
     for block in &mut flat.blocks {
         fuser.block(block);
+    }
+}
+
+/// Limits that are literals, as most are, need no care for NaN: that takes three
+/// times as long as the comparison.
+fn know_limits(flat: &mut Flat) {
+    let is_number = |reg: &Reg| {
+        let constant = flat.regs[reg.0 as usize].constant;
+        constant.is_some_and(|bits| !f32::from_bits(bits).is_nan())
+    };
+    for inst in flat.blocks.iter_mut().flat_map(|block| &mut block.insts) {
+        if inst.operands.get(1).is_some_and(is_number) {
+            inst.op = match inst.op {
+                Op::Arith(Arith::MinF) => Op::Arith(Arith::AtMostF),
+                Op::Arith(Arith::MaxF) => Op::Arith(Arith::AtLeastF),
+                other => other,
+            };
+        }
     }
 }
 

@@ -12,6 +12,6 @@ pub(crate) mod written;
 pub use buffer::Buffer;
 pub use texture::{Texture, TextureView};
 
-pub(crate) use texel::{Channels, decode, encode, unorm8};
+pub(crate) use texel::{Channels, decode, encode, unorm8, unorm8_codes};
 pub(crate) use texture::{Level, Texels};
 pub(crate) use wide::{WideTexels, WideWords, in_range};

@@ -206,11 +206,11 @@ pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out
         ),
         Format::R8Unorm => words!(out[0], k, u64::from(code8(r[k]))),
         Format::Rg8Unorm => words!(out[0], k, u64::from(code8(r[k]) | (code8(g[k]) << 8))),
-        Format::Rgba8Unorm => words!(
-            out[0],
-            k,
-            u64::from(code8(r[k]) | (code8(g[k]) << 8) | (code8(b[k]) << 16) | (code8(a[k]) << 24))
-        ),
+        Format::Rgba8Unorm => {
+            let mut codes = [0; K];
+            unorm8_codes(channels, &mut codes);
+            words!(out[0], k, u64::from(codes[k]));
+        }
         _ => {
             for k in 0..K {
                 let bits = [r[k], g[k], b[k], a[k]];
@@ -241,6 +241,35 @@ fn pair(low: u32, high: u32) -> u64 {
 #[inline(always)]
 fn half(bits: u32) -> u32 {
     f32_to_f16(f32::from_bits(bits))
+}
+
+/// Texels of four 8-bit normalised channels.
+#[inline(always)]
+pub(crate) fn unorm8_codes<const K: usize>(channels: &Channels<K>, out: &mut [u32; K]) {
+    *out = [0; K];
+    let mut near_half = false;
+    for (c, lanes) in channels.iter().enumerate() {
+        for k in 0..K {
+            // From 2^23 on the unit of f32 is 1. The product is within 2^-17 of
+            // the exact one, so that it rounds alike unless it is as near as
+            // that to half way between two integers.
+            const UNIT: f32 = 8_388_608.0;
+            let value = f32::from_bits(lanes[k]);
+            let value = if value > 0.0 { value } else { 0.0 };
+            let value = if value < 1.0 { value } else { 1.0 };
+            let scaled = value * 255.0;
+            let shifted = scaled + UNIT;
+            let off = (shifted - UNIT) - scaled;
+            near_half |= off * off > 0.2499;
+            out[k] |= (shifted.to_bits() & 0xff) << (8 * c);
+        }
+    }
+    if near_half {
+        let [r, g, b, a] = channels;
+        for k in 0..K {
+            out[k] = code8(r[k]) | code8(g[k]) << 8 | code8(b[k]) << 16 | code8(a[k]) << 24;
+        }
+    }
 }
 
 /// Clamped, scaled exactly, rounded to nearest even; NaN gives 0.
@@ -370,6 +399,44 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// At every value half way between two codes, at its neighbours, and at
+    /// codes, alone so that other lanes do not ask for more care.
+    #[test]
+    fn eight_bits_are_rounded_exactly() {
+        let check = |value: f32| {
+            let exact = (f64::from(value) * 255.0).clamp(0.0, 255.0);
+            let expected = if value.is_nan() {
+                0
+            } else {
+                exact.round_ties_even() as u32
+            };
+            let lane = [value.to_bits(); 1];
+            let mut code = [0];
+            unorm8_codes(&[lane, [0], lane, [0]], &mut code);
+            assert_eq!(code[0], expected | expected << 16, "{value}");
+        };
+        for code in 0..=255_u32 {
+            for value in [code as f32 / 255.0, (code as f32 + 0.5) / 255.0] {
+                let (mut below, mut above) = (value, value);
+                for _ in 0..40 {
+                    check(below);
+                    check(above);
+                    (below, above) = (below.next_down(), above.next_up());
+                }
+            }
+        }
+        for value in [
+            f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            -0.0,
+            1e-40,
+            1e30,
+        ] {
+            check(value);
         }
     }
 

@@ -108,6 +108,10 @@ pub(crate) trait Number: Lane + Operands {
     fn min(self, other: Self) -> Self;
     /// The other operand when one is NaN, the second when they are equal.
     fn max(self, other: Self) -> Self;
+    /// [`Number::min`] for a limit that is not NaN.
+    fn at_most(self, limit: Self) -> Self;
+    /// [`Number::max`] for a limit that is not NaN.
+    fn at_least(self, limit: Self) -> Self;
     fn pow(self, other: Self) -> Self;
     fn atan2(self, other: Self) -> Self;
     fn ldexp(self, exponent: i32) -> Self;

@@ -56,7 +56,7 @@ impl Number for Shadow {
     both! {
         neg abs sign floor ceil trunc round sqrt exp exp2 log log2 sin cos tan
         asin acos atan sinh cosh tanh asinh acosh atanh;
-        add sub mul div rem min max pow atan2
+        add sub mul div rem min max at_most at_least pow atan2
     }
 
     #[inline(always)]

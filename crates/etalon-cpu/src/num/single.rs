@@ -52,6 +52,14 @@ impl Number for f32 {
         Number::select(mask((self > other) | other.is_nan()), self, other)
     }
     #[inline(always)]
+    fn at_most(self, limit: Self) -> Self {
+        if self < limit { self } else { limit }
+    }
+    #[inline(always)]
+    fn at_least(self, limit: Self) -> Self {
+        if self > limit { self } else { limit }
+    }
+    #[inline(always)]
     fn pow(self, other: Self) -> Self {
         pow(self, other)
     }
@@ -100,9 +108,10 @@ impl Number for f32 {
     }
     #[inline(always)]
     fn floor_in_steps(self) -> Self {
+        // A zero has the sign of the number: taking off 0 keeps it.
         let nearest = Number::round_in_steps(self);
         let above = f32::from_bits(mask(nearest > self) & 1.0_f32.to_bits());
-        with_sign_of(nearest - above, self)
+        nearest - above
     }
     #[inline(always)]
     fn ceil_in_steps(self) -> Self {
@@ -120,7 +129,8 @@ impl Number for f32 {
         // From here on every number is an integer: the sum rounds to one.
         const INTEGERS: f32 = 8_388_608.0;
         let size = Number::abs(self);
-        let nearest = with_sign_of((size + INTEGERS) - INTEGERS, self);
+        let sign = self.to_bits() ^ size.to_bits();
+        let nearest = f32::from_bits(((size + INTEGERS) - INTEGERS).to_bits() | sign);
         Number::select(mask(size < INTEGERS), nearest, self)
     }
     #[inline(always)]
@@ -207,14 +217,18 @@ impl Number for f32 {
 
     #[inline(always)]
     fn to_i32(self) -> i32 {
-        let negative = mask(self < 0.0);
-        let magnitude = truncated_magnitude(self).min(0x7fff_ff80 + (negative & 0x80));
-        let value = (magnitude ^ negative).wrapping_sub(negative);
-        (value & !mask(self.is_nan())) as i32
+        truncated(self) & mask(!self.is_nan()) as i32
     }
     #[inline(always)]
     fn to_u32(self) -> u32 {
-        truncated_magnitude(self) & mask(self > 0.0)
+        const MIDDLE: f32 = 2_147_483_648.0;
+        const LARGEST: f32 = 4_294_967_040.0;
+        let value = if self > 0.0 { self } else { 0.0 };
+        let value = if value < LARGEST { value } else { LARGEST };
+        // What signed integers do not reach is brought down, exactly.
+        let high = mask(value >= MIDDLE);
+        let low = value - f32::from_bits(high & MIDDLE.to_bits());
+        truncated(low) as u32 | (high & (1 << 31))
     }
     #[inline(always)]
     fn from_i32(value: i32) -> Self {
@@ -238,18 +252,19 @@ fn with_sign_of(magnitude: f32, sign: f32) -> f32 {
     f32::from_bits((magnitude.to_bits() & !SIGN) | (sign.to_bits() & SIGN))
 }
 
-/// The integer part of `|x|`, at most the largest `f32` below 2^32; anything for NaN.
+/// The integer part, at least -2^31 and at most the largest `f32` below 2^31;
+/// anything for NaN.
 ///
 /// What `as` does, but as vector code: compilers leave saturating conversions
 /// scalar.
 #[inline(always)]
-fn truncated_magnitude(x: f32) -> u32 {
-    const LARGEST: f64 = 4_294_967_040.0;
-    // From here on the unit of f64 is 1: adding rounds to the nearest integer.
-    const UNIT: f64 = 4_503_599_627_370_496.0;
-    let x = f64::from(Number::abs(x));
+#[allow(unsafe_code)]
+fn truncated(x: f32) -> i32 {
+    const LEAST: f32 = -2_147_483_648.0;
+    const LARGEST: f32 = 2_147_483_520.0;
+    // Comparisons with NaN are false, so that it becomes the limit.
+    let x = if x > LEAST { x } else { LEAST };
     let x = if x < LARGEST { x } else { LARGEST };
-    let nearest = (x + UNIT) - UNIT;
-    let below = nearest - if nearest > x { 1.0 } else { 0.0 };
-    (below + UNIT).to_bits() as u32
+    // SAFETY: between the limits, which `i32` holds, and not NaN.
+    unsafe { x.to_int_unchecked() }
 }

@@ -163,9 +163,11 @@ impl Request<'_> {
         footprint: &Footprint<K>,
         place: &Place<K>,
     ) -> [Channels<K>; 4] {
-        let mut texels: [Channels<K>; 4] = std::array::from_fn(|tap| {
-            self.texels::<I, K>(&self.index(footprint, place, tap), &place.reference)
-        });
+        // No closure here: it would not be compiled for the instruction set.
+        let mut texels = [[[0; K]; 4]; 4];
+        for (tap, texels) in texels.iter_mut().enumerate() {
+            *texels = self.texels::<I, K>(&self.index(footprint, place, tap), &place.reference);
+        }
         for k in 0..K {
             let (x, y) = (footprint.first[0][k], footprint.first[1][k]);
             let size = footprint.levels[k].width as i32;

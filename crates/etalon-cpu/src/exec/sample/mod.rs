@@ -17,7 +17,7 @@ use etalon_core::resource::{Compare, Filter, SamplerDesc};
 use self::axis::AxisTexels;
 use self::lod::Lod;
 use super::image::{texture, wanted};
-use super::isa::{Isa, Portable};
+use super::isa::{Baseline, Isa};
 use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
@@ -69,7 +69,7 @@ pub(super) fn one(
         layer: [layer],
         reference: [0.0],
     };
-    request.sample::<Portable, 1>(&place, &Lod::Same(lod))[0][0]
+    request.sample::<Baseline, 1>(&place, &Lod::Same(lod))[0][0]
 }
 
 struct Sample<const K: usize>;

@@ -1,0 +1,382 @@
+//! The instruction sets of x86-64.
+
+use std::arch::x86_64::*;
+use std::mem::transmute;
+
+use super::{BLOCK, Isa};
+
+/// What every processor of the architecture has.
+pub(crate) struct Sse2;
+
+// SAFETY: every x86-64 processor has SSE2.
+unsafe impl Isa for Sse2 {
+    #[inline(always)]
+    unsafe fn load4(words: *const u32, _: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
+        // SAFETY: the caller's promise.
+        unsafe { load_runs(words, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn load8(words: *const u64, _: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
+        // SAFETY: the caller's promise.
+        unsafe { load_pairs(words, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
+        split_by_unpacking(words)
+    }
+
+    #[inline(always)]
+    fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
+        join_by_unpacking(parts)
+    }
+}
+
+/// AVX2 and F16C.
+pub(crate) struct Avx2;
+
+// SAFETY: AVX2 and F16C, which the tier has.
+unsafe impl Isa for Avx2 {
+    #[inline(always)]
+    unsafe fn load4(words: *const u32, _: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
+        // SAFETY: the caller's promise.
+        unsafe { load_runs(words, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn load8(words: *const u64, _: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
+        // SAFETY: the caller's promise. Gathers of AVX2 are no faster.
+        unsafe { load_pairs(words, index) }
+    }
+
+    #[inline(always)]
+    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
+        // SAFETY: the instructions are there, see the trait; the types are
+        // plain numbers of the same sizes.
+        unsafe {
+            let halves: [__m128i; 2] = transmute(bits);
+            transmute([_mm256_cvtph_ps(halves[0]), _mm256_cvtph_ps(halves[1])])
+        }
+    }
+
+    #[inline(always)]
+    fn to_halves(values: [f32; BLOCK]) -> [u16; BLOCK] {
+        const NEAREST: i32 = _MM_FROUND_TO_NEAREST_INT;
+        // SAFETY: as above.
+        unsafe {
+            let [low, high]: [__m256; 2] = transmute(values);
+            transmute([
+                _mm256_cvtps_ph::<NEAREST>(low),
+                _mm256_cvtps_ph::<NEAREST>(high),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
+        split_by_unpacking(words)
+    }
+
+    #[inline(always)]
+    fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
+        join_by_unpacking(parts)
+    }
+}
+
+/// AVX-512 F, BW, DQ and VL.
+pub(crate) struct Avx512;
+
+// SAFETY: the instructions are those that the tier has.
+unsafe impl Isa for Avx512 {
+    /// As [`load_near`], for the two halves at once.
+    #[inline(always)]
+    unsafe fn load4(words: *const u32, count: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
+        const NEAR: usize = 16;
+        const SECOND: __mmask16 = 0xff00;
+        let (first, second) = (index[0] as usize, index[8] as usize);
+        // SAFETY: as for AVX2, and the caller's promise.
+        unsafe {
+            let lanes: __m512i = transmute(index);
+            let from = _mm512_set1_epi32(first as i32);
+            let from = _mm512_mask_set1_epi32(from, SECOND, second as i32);
+            let beyond = _mm512_sub_epi32(lanes, from);
+            let near = _mm512_set1_epi32(NEAR as i32);
+            let far = _mm512_cmpge_epu32_mask(beyond, near);
+            if far != 0 || first + NEAR > count || second + NEAR > count {
+                return transmute(_mm512_i32gather_epi32::<4>(lanes, words.cast()));
+            }
+            let order = _mm512_mask_add_epi32(beyond, SECOND, beyond, near);
+            let first = _mm512_loadu_si512(words.add(first).cast());
+            let second = _mm512_loadu_si512(words.add(second).cast());
+            transmute(_mm512_permutex2var_epi32(first, order, second))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn load8(words: *const u64, count: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
+        // SAFETY: as for AVX2, and the caller's promise.
+        unsafe {
+            let [low, high]: [__m256i; 2] = transmute(index);
+            transmute([
+                load_near(words, count, low, index[0]),
+                load_near(words, count, high, index[8]),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
+        // SAFETY: the caller's promise.
+        unsafe { store_runs(words, index, bits) };
+    }
+
+    #[inline(always)]
+    fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
+        // SAFETY: as for AVX2.
+        unsafe { transmute(_mm512_cvtph_ps(transmute::<[u16; BLOCK], __m256i>(bits))) }
+    }
+
+    #[inline(always)]
+    fn to_halves(values: [f32; BLOCK]) -> [u16; BLOCK] {
+        const NEAREST: i32 = _MM_FROUND_TO_NEAREST_INT;
+        // SAFETY: as for AVX2.
+        unsafe {
+            let values: __m512 = transmute(values);
+            transmute(_mm512_cvtps_ph::<NEAREST>(values))
+        }
+    }
+
+    #[inline(always)]
+    fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
+        // Two parts of every word at a time.
+        const fn parts(first: u16) -> [u16; 32] {
+            let (mut order, mut k) = ([0; 32], 0);
+            while k < 16 {
+                order[k] = 4 * k as u16 + first;
+                order[k + 16] = 4 * k as u16 + first + 1;
+                k += 1;
+            }
+            order
+        }
+        const LOW: [u16; 32] = parts(0);
+        const HIGH: [u16; 32] = parts(2);
+        // SAFETY: as for AVX2.
+        unsafe {
+            let [first, second]: [__m512i; 2] = transmute(words);
+            transmute([
+                _mm512_permutex2var_epi16(first, transmute::<[u16; 32], __m512i>(LOW), second),
+                _mm512_permutex2var_epi16(first, transmute::<[u16; 32], __m512i>(HIGH), second),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
+        // Eight words at a time, from parts 0 and 1, and 2 and 3.
+        const fn words(first: u16) -> [u16; 32] {
+            let (mut order, mut k) = ([0; 32], 0);
+            while k < 8 {
+                let word = first + k as u16;
+                order[4 * k] = word;
+                order[4 * k + 1] = word + 16;
+                order[4 * k + 2] = word + 32;
+                order[4 * k + 3] = word + 48;
+                k += 1;
+            }
+            order
+        }
+        const FIRST: [u16; 32] = words(0);
+        const SECOND: [u16; 32] = words(8);
+        // SAFETY: as for AVX2.
+        unsafe {
+            let [low, high]: [__m512i; 2] = transmute(parts);
+            transmute([
+                _mm512_permutex2var_epi16(low, transmute::<[u16; 32], __m512i>(FIRST), high),
+                _mm512_permutex2var_epi16(low, transmute::<[u16; 32], __m512i>(SECOND), high),
+            ])
+        }
+    }
+}
+
+/// Words at eight indices, of which `first` is the first one. Mostly they are of
+/// one row of a texture, next to each other: two loads and a permutation then
+/// take half of a gather's time.
+///
+/// # Safety
+/// As for [`Isa::load8`], where there is AVX-512.
+#[inline(always)]
+unsafe fn load_near(words: *const u64, count: usize, index: __m256i, first: u32) -> __m512i {
+    const NEAR: usize = 16;
+    // SAFETY: the caller's promise.
+    unsafe {
+        let beyond = _mm256_sub_epi32(index, _mm256_set1_epi32(first as i32));
+        let far = _mm256_cmpge_epu32_mask(beyond, _mm256_set1_epi32(NEAR as i32));
+        if far != 0 || first as usize + NEAR > count {
+            return _mm512_i32gather_epi64::<8>(index, words.cast());
+        }
+        let base = words.add(first as usize);
+        let low = _mm512_loadu_si512(base.cast());
+        let high = _mm512_loadu_si512(base.add(NEAR / 2).cast());
+        _mm512_permutex2var_epi64(low, _mm512_cvtepu32_epi64(beyond), high)
+    }
+}
+
+/// Words, two at a time into a register.
+///
+/// # Safety
+/// As for [`Isa::load8`].
+#[inline(always)]
+unsafe fn load_pairs(words: *const u64, index: [u32; BLOCK]) -> [u64; BLOCK] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let mut pairs = [_mm_setzero_si128(); BLOCK / 2];
+        for k in 0..BLOCK / 2 {
+            let low = words.add(index[2 * k] as usize);
+            let high = words.add(index[2 * k + 1] as usize);
+            let pair = _mm_loadl_epi64(low.cast());
+            pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(pair), high.cast()));
+        }
+        transmute(pairs)
+    }
+}
+
+/// Lanes that mostly are next to each other in a row of a texture.
+const RUN: usize = 8;
+
+/// Whether the indices from `first` on are of words next to each other.
+#[inline(always)]
+fn is_run(index: &[u32; BLOCK], first: usize) -> bool {
+    let mut off = 0;
+    for k in 0..RUN {
+        off |= index[first + k].wrapping_sub(index[first]) ^ k as u32;
+    }
+    off == 0
+}
+
+/// Words, eight at once where they are next to each other.
+///
+/// # Safety
+/// As for [`Isa::load4`].
+#[inline(always)]
+unsafe fn load_runs(words: *const u32, index: [u32; BLOCK]) -> [u32; BLOCK] {
+    let mut bits = [0; BLOCK];
+    for first in [0, RUN] {
+        // SAFETY: the caller's promise; the run's last index is one of them.
+        unsafe {
+            if is_run(&index, first) {
+                let run: [u32; RUN] = words.add(index[first] as usize).cast::<[u32; RUN]>().read();
+                bits[first..first + RUN].copy_from_slice(&run);
+            } else {
+                for k in first..first + RUN {
+                    bits[k] = words.add(index[k] as usize).read();
+                }
+            }
+        }
+    }
+    bits
+}
+
+/// Writes words, eight at once where they are next to each other.
+///
+/// # Safety
+/// As for [`Isa::store4`].
+#[inline(always)]
+unsafe fn store_runs<T: Copy>(words: *mut T, index: [u32; BLOCK], bits: [T; BLOCK]) {
+    for first in [0, RUN] {
+        // SAFETY: the caller's promise; the run's last index is one of them.
+        unsafe {
+            if is_run(&index, first) {
+                let run = words.add(index[first] as usize);
+                run.copy_from_nonoverlapping(bits.as_ptr().add(first), RUN);
+            } else {
+                for k in first..first + RUN {
+                    words.add(index[k] as usize).write(bits[k]);
+                }
+            }
+        }
+    }
+}
+
+/// Parts of words, by interleaving words with those two further, then what is
+/// next to each other.
+#[inline(always)]
+fn split_by_unpacking(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
+    // SAFETY: every x86-64 processor has SSE2; the types are plain numbers of
+    // the same sizes.
+    unsafe {
+        let pairs: [__m128i; BLOCK / 2] = transmute(words);
+        let mut parts = [[_mm_setzero_si128(); 2]; 4];
+        for half in 0..2 {
+            // Parts 0 and 1, and 2 and 3, of four words.
+            let mut fours = [[_mm_setzero_si128(); 2]; 2];
+            for four in 0..2 {
+                let (first, second) = (pairs[4 * half + 2 * four], pairs[4 * half + 2 * four + 1]);
+                let even = _mm_unpacklo_epi16(first, second);
+                let odd = _mm_unpackhi_epi16(first, second);
+                fours[four] = [_mm_unpacklo_epi16(even, odd), _mm_unpackhi_epi16(even, odd)];
+            }
+            let [near, far] = fours;
+            for two in 0..2 {
+                parts[2 * two][half] = _mm_unpacklo_epi64(near[two], far[two]);
+                parts[2 * two + 1][half] = _mm_unpackhi_epi64(near[two], far[two]);
+            }
+        }
+        transmute(parts)
+    }
+}
+
+/// The reverse of [`split_by_unpacking`].
+#[inline(always)]
+fn join_by_unpacking(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
+    // SAFETY: as above.
+    unsafe {
+        let parts: [[__m128i; 2]; 4] = transmute(parts);
+        let mut pairs = [_mm_setzero_si128(); BLOCK / 2];
+        for half in 0..2 {
+            let (a, b, c, d) = (
+                parts[0][half],
+                parts[1][half],
+                parts[2][half],
+                parts[3][half],
+            );
+            let (low, high) = (_mm_unpacklo_epi16(a, b), _mm_unpacklo_epi16(c, d));
+            pairs[4 * half] = _mm_unpacklo_epi32(low, high);
+            pairs[4 * half + 1] = _mm_unpackhi_epi32(low, high);
+            let (low, high) = (_mm_unpackhi_epi16(a, b), _mm_unpackhi_epi16(c, d));
+            pairs[4 * half + 2] = _mm_unpacklo_epi32(low, high);
+            pairs[4 * half + 3] = _mm_unpackhi_epi32(low, high);
+        }
+        transmute(pairs)
+    }
+}

@@ -11,18 +11,6 @@ use crate::memory::{WideTexels, in_range};
 use crate::num::Number;
 use crate::registers::LANES;
 
-/// Indices of a channel's words; outside stays outside.
-#[inline(always)]
-fn words_of<const K: usize>(index: &[u32; K], channels: u32, channel: u32) -> [u32; K] {
-    let mut at = [0; K];
-    for k in 0..K {
-        // Planes have fewer words than 2^32 - 4, see `WideTexels`: `OUTSIDE`
-        // wraps to one of the last indices, which is none.
-        at[k] = index[k].wrapping_mul(channels).wrapping_add(channel);
-    }
-    at
-}
-
 /// A channel of the texels at `index`; 0 outside.
 #[inline(always)]
 pub(super) fn channel<I: Isa, const K: usize>(
@@ -32,8 +20,7 @@ pub(super) fn channel<I: Isa, const K: usize>(
 ) -> [f64; K] {
     let mut out = [0.0; K];
     if channel < wide.channels() {
-        let at = words_of(index, wide.channels(), channel);
-        let bits = texels::load8::<I, K>(wide.words(), &at);
+        let bits = texels::load8::<I, K>(wide.channel(channel), index);
         for k in 0..K {
             out[k] = f64::from_bits(bits[k]);
         }
@@ -82,11 +69,10 @@ pub(super) fn store<I: Isa, N: Number>(
                 value[k] = in_range(encoding, value[k]);
             }
         }
-        let at = words_of(index, wide.channels(), c);
         let mut bits = [0; LANES];
         for k in 0..LANES {
             bits[k] = value[k].to_bits();
         }
-        texels::store8::<I, LANES>(wide.words(), &at, &bits);
+        texels::store8::<I, LANES>(wide.channel(c), index, &bits);
     }
 }

@@ -56,27 +56,23 @@ pub(crate) fn in_range(encoding: Encoding, value: f64) -> f64 {
     }
 }
 
-/// The wide plane of a texture: its channels, texel after texel, in the order of
-/// the texels.
+/// The wide plane of a texture: all first channels, in the order of the texels,
+/// then all second ones. What lanes next to each other read is so, too.
 #[derive(Debug)]
 pub(crate) struct WideTexels {
     values: Vec<AtomicU64>,
+    texels: usize,
     channels: u32,
 }
 
 impl WideTexels {
-    /// A plane of zeros, of fewer than 2^32 - 4 words.
+    /// A plane of zeros.
     pub(crate) fn zeroed(texels: u64, channels: u32) -> Result<Self, RunError> {
-        let count = texels.saturating_mul(channels.into());
-        // So that the index of a word, and of one outside, is 32 bits.
-        if count >= u64::from(u32::MAX - 3) {
-            return Err(RunError::OutOfMemory {
-                what: "the wide plane of a texture".to_owned(),
-                bytes: count.saturating_mul(8),
-            });
-        }
+        let what = "the wide plane of a texture";
+        let values = reserve(what, texels.saturating_mul(channels.into()), 0)?;
         Ok(Self {
-            values: reserve("the wide plane of a texture", count, 0)?,
+            texels: values.len() / channels.max(1) as usize,
+            values,
             channels,
         })
     }
@@ -85,9 +81,11 @@ impl WideTexels {
         self.values.len() as u64 * 8
     }
 
-    /// The channels of all texels.
-    pub(crate) fn words(&self) -> &[AtomicU64] {
-        &self.values
+    /// A channel of all texels; of none if the format has it not.
+    #[inline(always)]
+    pub(crate) fn channel(&self, channel: u32) -> &[AtomicU64] {
+        let from = channel as usize * self.texels;
+        self.values.get(from..from + self.texels).unwrap_or(&[])
     }
 
     pub(crate) fn channels(&self) -> u32 {
@@ -96,11 +94,9 @@ impl WideTexels {
 
     /// One texel; channels that the format has not are 0, 0, 1.
     pub(crate) fn get(&self, texel: usize) -> Option<[f64; 4]> {
-        let channels = self.channels as usize;
-        let at = texel.checked_mul(channels)?;
-        let values = self.values.get(at..at.checked_add(channels)?)?;
         let mut out = [0.0, 0.0, 0.0, 1.0];
-        for (out, value) in out.iter_mut().zip(values) {
+        for (channel, out) in (0..self.channels).zip(&mut out) {
+            let value = self.channel(channel).get(texel)?;
             *out = f64::from_bits(value.load(Ordering::Relaxed));
         }
         Some(out)
@@ -108,12 +104,10 @@ impl WideTexels {
 
     /// Sets one texel; nothing happens outside.
     pub(crate) fn set(&self, texel: usize, value: [f64; 4]) {
-        let channels = self.channels as usize;
-        let values = texel
-            .checked_mul(channels)
-            .and_then(|at| self.values.get(at..at.checked_add(channels)?));
-        for (to, value) in values.into_iter().flatten().zip(value) {
-            to.store(value.to_bits(), Ordering::Relaxed);
+        for (channel, value) in (0..self.channels).zip(value) {
+            if let Some(to) = self.channel(channel).get(texel) {
+                to.store(value.to_bits(), Ordering::Relaxed);
+            }
         }
     }
 }
@@ -219,7 +213,7 @@ mod tests {
 
     #[test]
     fn planes_too_large_for_memory_are_refused() {
-        for texels in [u64::MAX, 1 << 60, 1 << 30] {
+        for texels in [u64::MAX, 1 << 60] {
             assert!(matches!(
                 WideTexels::zeroed(texels, 4),
                 Err(RunError::OutOfMemory { .. })

@@ -111,7 +111,7 @@ impl Executor {
     }
 
     /// Whether dispatches record what each instruction costs, for
-    /// [`Program::profile`](crate::Program::profile). They take up to twice as
+    /// [`Program::profile`](crate::Program::profile). They take about twice as
     /// long then; otherwise it costs nothing.
     #[must_use]
     pub fn with_profile(mut self, profile: bool) -> Self {

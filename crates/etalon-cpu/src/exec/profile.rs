@@ -8,7 +8,7 @@
 //! time is from one reading to the next, less what a reading takes, which is
 //! measured beforehand. Counts and lanes are exact. Reading takes about as long
 //! as a cheap instruction, so the times of those are good to some nanoseconds
-//! only, and a profiled dispatch takes up to twice as long as another.
+//! only, and a profiled dispatch takes about twice as long as another.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,7 +1,7 @@
 //! The same handlers, compiled for several instruction sets.
 //!
-//! The only unsafe code of the crate: functions that may use an instruction set
-//! are called where the processor was seen to have it.
+//! Functions that may use an instruction set are called where the processor was
+//! seen to have it.
 
 use std::fmt;
 

@@ -95,7 +95,7 @@ pub(super) fn addresses<N: Number, const K: usize>(
     let x = state.ints_in(operands[0], chunk, x);
     let y = state.ints_in(operands[1], chunk, y);
     let z =
-        (access.coordinates == 3 || access.layered).then(|| &*state.ints_in(operands[2], chunk, z));
+        (access.coordinates == 3 || access.layered).then(|| state.ints_in(operands[2], chunk, z));
     let mut out = [OUTSIDE; K];
     match level {
         Some(level) if level.varying => {

@@ -72,7 +72,7 @@ fn load<W: Word, const K: usize>(words: &[W], index: &[u32; K]) -> [W::Bits; K] 
 /// take signed ones.
 #[inline(always)]
 fn in_blocks<W, const K: usize>(words: &[W], index: &[u32; K]) -> bool {
-    K % BLOCK == 0 && words.len() <= i32::MAX as usize && all_inside(words, index, 1)
+    K.is_multiple_of(BLOCK) && words.len() <= i32::MAX as usize && all_inside(words, index, 1)
 }
 
 /// [`load`] and [`store`] as the instruction set has them.

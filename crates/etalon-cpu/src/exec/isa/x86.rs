@@ -128,7 +128,8 @@ unsafe impl Isa for Avx512 {
             let near = _mm512_set1_epi32(NEAR as i32);
             let far = _mm512_cmpge_epu32_mask(beyond, near);
             if far != 0 || first + NEAR > count || second + NEAR > count {
-                return transmute(_mm512_i32gather_epi32::<4>(lanes, words.cast()));
+                let gathered = _mm512_i32gather_epi32::<4>(lanes, words.cast());
+                return transmute::<__m512i, [u32; BLOCK]>(gathered);
             }
             let order = _mm512_mask_add_epi32(beyond, SECOND, beyond, near);
             let first = _mm512_loadu_si512(words.add(first).cast());

@@ -8,7 +8,7 @@ use std::process::Command;
 use etalon::backend::Backend;
 use etalon::kernel::{Arithmetic, KernelLibrary, KernelRequest, SpirvOptions, spirv};
 use etalon_tests::programs::{
-    Choices, Difference, Held, Interpreters, Malformed, Program, Results, STEPS, Trial,
+    Choices, Difference, Held, Interpreters, Malformed, Program, Results, STEPS, Stmt, Trial,
     differences, evaluate, execute, generate, of_seed, shrink, statements,
 };
 use etalon_tests::{cpu, executors};
@@ -69,6 +69,36 @@ fn programs_fit_together() {
         }
     }
     assert!(long < 10, "{long} of 300 programs take too long");
+}
+
+#[test]
+fn tickets_of_a_counter_are_all_used_alike() {
+    let mut drawn = 0;
+    for seed in 0..300 {
+        let (program, _) = of_seed(seed);
+        let Some(ticket) = program.main.iter().find_map(|stmt| match stmt {
+            Stmt::Ticket { from, scalar, draw } => Some((*from, *scalar, *draw)),
+            _ => None,
+        }) else {
+            continue;
+        };
+        drawn += 1;
+        let with = |factor| {
+            let (from, scalar, mut draw) = ticket;
+            draw.factor = factor;
+            let mut more = program.clone();
+            more.main.insert(0, Stmt::Ticket { from, scalar, draw });
+            evaluate(&more, STEPS).map(|_| ())
+        };
+        assert_eq!(with(ticket.2.factor), Ok(()), "seed {seed}");
+        // Whether a number is doubled would depend on who draws it.
+        assert_eq!(
+            with(ticket.2.factor * 2),
+            Err(Malformed::Unordered),
+            "seed {seed}"
+        );
+    }
+    assert!(drawn > 3, "{drawn} of 300 programs draw tickets");
 }
 
 #[test]

@@ -24,6 +24,10 @@ pub enum Malformed {
     /// More steps than are worth waiting for.
     #[error("the program takes too many steps")]
     TooLong,
+    /// Statements that draw tickets from the same counter and do different
+    /// things with them: what comes out depends on who comes first.
+    #[error("the outcome depends on the order of invocations")]
+    Unordered,
 }
 
 /// What a program leaves behind.
@@ -57,6 +61,7 @@ pub fn evaluate(program: &Program, limit: u64) -> Result<Evaluation, Malformed> 
         program,
         results: Results::start(program.invocations() as usize * program.slots),
         shared: Vec::new(),
+        tickets: Vec::new(),
         open: Open::default(),
         steps: 0,
         limit,
@@ -139,6 +144,8 @@ struct Machine<'a> {
     program: &'a Program,
     results: Results,
     shared: Vec<Vec<u32>>,
+    /// Counters that tickets were drawn from, with what was done with them.
+    tickets: Vec<(Counter, Draw)>,
     open: Open,
     steps: u64,
     limit: u64,
@@ -427,15 +434,18 @@ impl Machine<'_> {
                 let value = self.scalar(inv, value)?;
                 self.update(*counter, Atomic::Add, value)?;
             }
-            Stmt::Ticket {
-                from,
-                to,
-                update,
-                factor,
-                ..
-            } => {
+            Stmt::Ticket { from, draw, .. } => {
+                match self.tickets.iter().find(|(other, _)| other == from) {
+                    Some((_, other)) if other != draw => return Err(Malformed::Unordered),
+                    Some(_) => {}
+                    None => self.tickets.push((*from, *draw)),
+                }
+                // Which workgroup draws which ticket depends on the order too.
+                if matches!(draw.to, Counter::Workgroup(..)) {
+                    return Err(Malformed::Unordered);
+                }
                 let ticket = self.update(*from, Atomic::Add, 1)?;
-                self.update(*to, *update, ticket.wrapping_mul(*factor))?;
+                self.update(draw.to, draw.update, ticket.wrapping_mul(draw.factor))?;
             }
             Stmt::OwnAtomic {
                 id,

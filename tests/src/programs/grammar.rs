@@ -458,6 +458,17 @@ pub enum Counter {
     Workgroup(usize, usize),
 }
 
+/// What is done with a number drawn from a counter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Draw {
+    /// Updates this.
+    pub to: Counter,
+    /// So.
+    pub update: Atomic,
+    /// A factor for the number.
+    pub factor: u32,
+}
+
 /// The barrier at the end of a phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Barrier {
@@ -542,19 +553,21 @@ pub enum Stmt {
     Count(Counter, Atomic, Expr),
     /// Adds to a counter by `atomicCompareExchangeWeak` until that succeeds.
     CompareAndAdd(Counter, Scalar, Expr),
-    /// Adds 1 to a counter and updates another with what it was: who gets
-    /// which number depends on the order, the set of numbers does not.
+    /// Adds 1 to a counter and updates another with what it was.
+    ///
+    /// Atomic operations on one location happen in some order, and WGSL does
+    /// not say which: who gets which number is open, the set of numbers is not.
+    /// So the outcome is defined where everyone does the same with a number of
+    /// that counter, all over the program. A second statement that updates
+    /// something else, or does so in another way, would get an unknown part of
+    /// the numbers.
     Ticket {
         /// Takes the number from here.
         from: Counter,
         /// Its type.
         scalar: Scalar,
-        /// Updates this.
-        to: Counter,
-        /// So.
-        update: Atomic,
-        /// A factor for the number.
-        factor: u32,
+        /// Does this with it.
+        draw: Draw,
     },
     /// An atomic operation on this invocation's own element of a workgroup
     /// variable: its result is defined, and named. Of

@@ -378,13 +378,8 @@ impl Printer<'_> {
                      if swap.exchanged {{ break; }} old = swap.old_value; }} }}"
                 )
             }
-            Stmt::Ticket {
-                from,
-                scalar,
-                to,
-                update,
-                factor,
-            } => {
+            Stmt::Ticket { from, scalar, draw } => {
+                let Draw { to, update, factor } = draw;
                 let (from, to) = (self.counter(*from), self.counter(*to));
                 let one = literal(*scalar, 1);
                 let factor = literal(*scalar, *factor);

@@ -297,11 +297,13 @@ impl Editor {
                 }
                 self.expr(value);
             }
-            Stmt::Ticket { factor, .. } => {
-                if *factor != 1 {
+            Stmt::Ticket { draw, .. } => {
+                if draw.factor != 1 {
                     self.seen += 1;
+                    // Where several draw from the counter, they no longer do the
+                    // same then, and an evaluation refuses that.
                     if self.now(Edits::Expressions) {
-                        *factor = 1;
+                        draw.factor = 1;
                     }
                 }
             }

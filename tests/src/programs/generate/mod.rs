@@ -9,7 +9,8 @@
 //!   a pointer to a private variable that the callee knows by name.
 //! * Workgroup memory is used in phases with a barrier between them. In one
 //!   phase a variable is written by its owner only, or read only, or updated
-//!   by operations that commute.
+//!   by operations that commute. Tickets drawn from one counter are all used
+//!   alike, for who gets which is not defined.
 //! * Loops count their iterations, and the counts of nested loops and of
 //!   functions called in them are limited together.
 
@@ -88,6 +89,8 @@ struct Generator<'a> {
     access: Vec<Access>,
     /// The invocation that is alone at the moment.
     alone: Option<u32>,
+    /// What the program does with tickets of each counter that it draws from.
+    draws: Vec<(Counter, Draw)>,
     next: Id,
     /// Whether this is the entry point.
     in_main: bool,
@@ -163,6 +166,7 @@ impl<'a> Generator<'a> {
             scope: Scope::default(),
             access: Vec::new(),
             alone: None,
+            draws: Vec::new(),
             next: 0,
             in_main: true,
             private: true,

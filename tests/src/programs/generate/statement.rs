@@ -378,18 +378,11 @@ impl Generator<'_> {
         }
         let (counter, scalar, rule) = self.choices.of(&counters);
         if rule == Rule::Tickets {
-            let others: Vec<(Counter, Rule)> = counters
-                .iter()
-                .filter(|(_, other, rule)| *other == scalar && *rule != Rule::Tickets)
-                .map(|(other, _, rule)| (*other, *rule))
-                .collect();
-            let (to, rule) = self.choices.of(&others);
+            let draw = self.draw(counter, scalar, &counters);
             return Stmt::Ticket {
                 from: counter,
                 scalar,
-                to,
-                update: self.choices.of(rule.operations()),
-                factor: 1 + self.choices.below(1000) as u32,
+                draw,
             };
         }
         let value = self.expr(&Type::Scalar(scalar), 2);
@@ -404,6 +397,35 @@ impl Generator<'_> {
             return Stmt::CompareAndAdd(counter, scalar, value);
         }
         Stmt::Count(counter, self.choices.of(rule.operations()), value)
+    }
+
+    /// What to do with tickets of a counter: the same as everywhere in the
+    /// program, see [`Stmt::Ticket`].
+    fn draw(
+        &mut self,
+        from: Counter,
+        scalar: Scalar,
+        counters: &[(Counter, Scalar, Rule)],
+    ) -> Draw {
+        // Not a workgroup's own: which workgroup gets which ticket is open.
+        let others: Vec<(Counter, Rule)> = counters
+            .iter()
+            .filter(|(to, other, rule)| {
+                *other == scalar && *rule != Rule::Tickets && !matches!(to, Counter::Workgroup(..))
+            })
+            .map(|(to, _, rule)| (*to, *rule))
+            .collect();
+        let (to, rule) = self.choices.of(&others);
+        let draw = Draw {
+            to,
+            update: self.choices.of(rule.operations()),
+            factor: 1 + self.choices.below(1000) as u32,
+        };
+        if let Some((_, known)) = self.draws.iter().find(|(counter, _)| *counter == from) {
+            return *known;
+        }
+        self.draws.push((from, draw));
+        draw
     }
 
     fn own_atomic(&mut self, variable: usize, scalar: Scalar) -> Stmt {

@@ -13,10 +13,22 @@ pub struct Open {
     /// A NaN was asked for an order, an integer or its bits, or a zero for its
     /// sign (§15.7.2).
     pub unspecified: bool,
+    /// An infinity or a NaN went into a product with a matrix. Devices may
+    /// assume that there are none (§15.7.2), and here they do.
+    pub infinite: bool,
+    /// A zero was a difference of zeros. Devices may ignore the sign of a zero
+    /// (§15.7.2), and take `0.0 - x` for `-x`.
+    pub zero_made: bool,
+    /// The bits of a zero were looked at.
+    pub zero_seen: bool,
+    /// An integer was converted to a float that is not equal to it: either of
+    /// its neighbours (§15.7.6).
+    pub rounded: bool,
 }
 
 impl Open {
-    /// Whether anything was.
+    /// Whether devices may give other results, and often do. What seldom shows
+    /// is for [`may_differ`](super::may_differ).
     #[must_use]
     pub const fn any(self) -> bool {
         self.subnormal || self.unspecified
@@ -78,6 +90,7 @@ fn float_binary(op: Binary, a: f32, b: f32, open: &mut Open) -> u32 {
     };
     // A result that is normal only by rounding may have been flushed before.
     let tiny = result.abs() == f32::MIN_POSITIVE;
+    open.zero_made |= op == Binary::Subtract && a == 0.0 && b == 0.0;
     // Infinite, with the sign of a zero.
     open.unspecified |= op == Binary::Divide && b == 0.0;
     open.look(&[a, b, result]);
@@ -277,8 +290,16 @@ pub(super) fn convert(from: Scalar, to: Scalar, a: u32, open: &mut Open) -> u32 
             open.no_nan(&[float]);
             float.clamp(0.0, 4_294_967_040.0) as u32
         }
-        (Scalar::I32, Scalar::F32) => (a as i32 as f32).to_bits(),
-        (_, Scalar::F32) => (a as f32).to_bits(),
+        (Scalar::I32, Scalar::F32) => {
+            let near = a as i32 as f32;
+            open.rounded |= f64::from(near) != f64::from(a as i32);
+            near.to_bits()
+        }
+        (_, Scalar::F32) => {
+            let near = a as f32;
+            open.rounded |= f64::from(near) != f64::from(a);
+            near.to_bits()
+        }
         (_, Scalar::I32 | Scalar::U32) => a,
     }
 }
@@ -290,6 +311,7 @@ pub(super) fn bitcast(from: Scalar, to: Scalar, a: u32, open: &mut Open) -> u32 
         // A NaN's payload is free, and signalling ones may turn quiet.
         open.no_nan(&[float]);
         open.unspecified |= float == 0.0 && float.is_sign_negative();
+        open.zero_seen |= float == 0.0 && from == Scalar::F32;
     }
     a
 }

@@ -48,8 +48,21 @@ pub struct Evaluation {
     pub results: Results,
     /// What WGSL leaves open on the way.
     pub open: Open,
+    /// What is defined and known to go wrong on some driver.
+    pub risks: Risks,
     /// Statements and expressions evaluated.
     pub steps: u64,
+}
+
+/// What a program does that WGSL defines and a driver is known to get wrong:
+/// see [`may_differ`](super::may_differ).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Risks {
+    /// An invocation left a loop by its `break if` before the counter had it
+    /// leave.
+    pub left_early: bool,
+    /// `pack4xI8Clamp` was called.
+    pub packed_clamped: bool,
 }
 
 /// Evaluates a program, unless that takes more than `limit` steps.
@@ -63,6 +76,7 @@ pub fn evaluate(program: &Program, limit: u64) -> Result<Evaluation, Malformed> 
         shared: Vec::new(),
         tickets: Vec::new(),
         open: Open::default(),
+        risks: Risks::default(),
         steps: 0,
         limit,
     };
@@ -73,6 +87,7 @@ pub fn evaluate(program: &Program, limit: u64) -> Result<Evaluation, Malformed> 
     Ok(Evaluation {
         results: machine.results,
         open: machine.open,
+        risks: machine.risks,
         steps: machine.steps,
     })
 }
@@ -147,6 +162,7 @@ struct Machine<'a> {
     /// Counters that tickets were drawn from, with what was done with them.
     tickets: Vec<(Counter, Draw)>,
     open: Open,
+    risks: Risks,
     steps: u64,
     limit: u64,
 }
@@ -389,16 +405,13 @@ impl Machine<'_> {
                     }
                     trip += 1;
                     inv.set(*id, vec![trip])?;
-                    let last = trip >= *trips;
-                    // `||` leaves out the second operand, `|` does not.
-                    if last && self.program.interpreter_only {
+                    if trip >= *trips {
                         break;
                     }
-                    let left = match until {
-                        Some(until) => self.scalar(inv, until)? != 0,
-                        None => false,
-                    };
-                    if last || left {
+                    if let Some(until) = until
+                        && self.scalar(inv, until)? != 0
+                    {
+                        self.risks.left_early = true;
                         break;
                     }
                 }
@@ -754,6 +767,11 @@ impl Machine<'_> {
         if (a.len() != width && a.len() != 1) || (b.len() != width && b.len() != 1) {
             return Err(Malformed::Broken);
         }
+        let matrix = |ty: &Type| matches!(ty, Type::Matrix { .. });
+        if op == Binary::Multiply && (matrix(left) || matrix(right)) {
+            let finite = |word: &u32| f32::from_bits(*word).is_finite();
+            self.open.infinite |= !a.iter().chain(b).all(finite);
+        }
         Ok((0..width)
             .map(|i| arithmetic::binary(op, scalar, at(a, i), at(b, i), &mut self.open))
             .collect())
@@ -803,7 +821,10 @@ impl Machine<'_> {
             }
             Function::Pack4xI8 => vec![arithmetic::pack(first, true, false)],
             Function::Pack4xU8 => vec![arithmetic::pack(first, false, false)],
-            Function::Pack4xI8Clamp => vec![arithmetic::pack(first, true, true)],
+            Function::Pack4xI8Clamp => {
+                self.risks.packed_clamped = true;
+                vec![arithmetic::pack(first, true, true)]
+            }
             Function::Pack4xU8Clamp => vec![arithmetic::pack(first, false, true)],
             Function::Unpack4xI8 => arithmetic::unpack(first[0], true).to_vec(),
             Function::Unpack4xU8 => arithmetic::unpack(first[0], false).to_vec(),

@@ -669,14 +669,8 @@ pub struct Program {
     pub data: Vec<u32>,
     /// The bits of what `reals` holds.
     pub reals: Vec<u32>,
-    /// Whether it may have what WGSL defines and devices get wrong:
-    ///
-    /// * `&&` and `||` in `continuing` blocks and `break if`. They are branches
-    ///   there: the continue construct of the SPIR-V becomes a graph of blocks.
-    ///   It is valid, and lavapipe (Mesa 22.3) and SwiftShader do not follow it;
-    ///   see `break-if-*.wgsl` among the kept programs.
-    /// * Shifts by 32 and more. WGSL takes the amount modulo 32; naga 30 leaves
-    ///   that out of the SPIR-V, where such a shift is undefined.
+    /// Whether it may shift by 32 and more. WGSL takes the amount modulo 32;
+    /// naga 30 leaves that out of the SPIR-V, where such a shift is undefined.
     pub interpreter_only: bool,
 }
 

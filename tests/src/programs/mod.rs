@@ -9,7 +9,8 @@
 //! the payload of a NaN, and on devices whether subnormal numbers are zeros and
 //! the sign of a zero ([`Held`]). Where a program lets such a freedom decide
 //! something, its results are [`Open`] and bind no device; the interpreter's
-//! tiers still have to agree.
+//! tiers still have to agree. Where it does what a driver is known to do
+//! otherwise at times, another result of that driver is no news ([`may_differ`]).
 //!
 //! [`shrink`] takes a program that goes wrong apart until nothing can be left
 //! out.
@@ -21,16 +22,18 @@ mod execute;
 mod generate;
 mod grammar;
 mod interpreter;
+mod known;
 mod print;
 mod shrink;
 mod trial;
 
 pub use arithmetic::Open;
 pub use choices::Choices;
-pub use evaluate::{Evaluation, Malformed, Results, evaluate};
+pub use evaluate::{Evaluation, Malformed, Results, Risks, evaluate};
 pub use execute::{Difference, ExecuteError, Held, differences, execute};
 pub use generate::{STEPS, generate, of_seed};
 pub use grammar::*;
 pub use interpreter::Interpreters;
+pub use known::{binds_devices, may_differ};
 pub use shrink::{Shrunk, shrink, size, statements};
 pub use trial::{ParseTrialError, Trial};

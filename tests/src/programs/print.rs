@@ -288,10 +288,7 @@ impl Printer<'_> {
             } => {
                 let until = match until {
                     None => format!("v{id} >= {trips}u"),
-                    Some(until) if self.program.interpreter_only => {
-                        format!("v{id} >= {trips}u || {}", self.expr(until))
-                    }
-                    Some(until) => format!("(v{id} >= {trips}u) | {}", self.expr(until)),
+                    Some(until) => format!("v{id} >= {trips}u || {}", self.expr(until)),
                 };
                 self.depth += 2;
                 let end = format!("v{id}++;\n{}    break if {until};", self.indent());

@@ -41,7 +41,9 @@ const CRASH_TRIES: usize = 200;
 /// tier, with 64 and 256 lanes, on one thread and on three, and wgpu and ash on
 /// every Vulkan driver have to give the same bits, NaN payloads and subnormal
 /// numbers aside. Programs that compute what WGSL leaves open, or that have what
-/// drivers are known to get wrong, are tried on the interpreter alone. What goes wrong is made as small as it gets and kept.
+/// naga gets wrong, are tried on the interpreter alone. What differs on a driver
+/// that is known to do otherwise what the program does is counted apart; what else
+/// goes wrong is made as small as it gets and kept.
 /// Exit status 0 means that all required backends ran and nothing went wrong,
 /// 1 that something did, 2 that the command line is wrong.
 #[derive(Clone, Debug, Args)]
@@ -124,6 +126,8 @@ struct Account {
     absent: Option<String>,
     agreed: u64,
     open: u64,
+    /// Gave something else, as the driver is known to do at times.
+    known: u64,
     /// By seed.
     failures: BTreeMap<u64, Failure>,
     crashes: usize,
@@ -290,6 +294,7 @@ impl Bench<'_> {
                     Line::Started { seed } => running = Some(seed),
                     Line::Agreed { .. } => account.agreed += 1,
                     Line::Open { .. } => account.open += 1,
+                    Line::Known { .. } => account.known += 1,
                     Line::Failed(failure) => {
                         account.failures.insert(failure.seed, failure);
                     }
@@ -390,9 +395,10 @@ fn report(options: &Options, executors: &[Executor], accounts: &[Account]) -> (S
             (Some(reason), _) => writeln!(text, "  {id}: no device: {reason}"),
             (None, device) => writeln!(
                 text,
-                "  {id}: {} agreed, {} left out, {} failed ({})",
+                "  {id}: {} agreed, {} left out, {} known to differ, {} failed ({})",
                 account.agreed,
                 account.open,
+                account.known,
                 account.failures.len(),
                 device.as_ref().map_or_else(
                     || "never ran".to_owned(),

@@ -475,8 +475,7 @@ impl Generator<'_> {
                 function(ty, all, vec![a])
             }
             _ => {
-                let branches = !self.continuing || self.program.interpreter_only;
-                let ops: &[Binary] = if *ty == BOOL && branches {
+                let ops: &[Binary] = if *ty == BOOL {
                     &[
                         Binary::LogicalAnd,
                         Binary::LogicalOr,

@@ -8,7 +8,7 @@ use std::process::Command;
 use etalon::backend::Backend;
 use etalon::kernel::{Arithmetic, KernelLibrary, KernelRequest, SpirvOptions, spirv};
 use etalon_tests::programs::{
-    Choices, Difference, Held, Interpreters, Malformed, Program, Results, STEPS, Stmt, Trial,
+    Choices, Difference, Draw, Held, Interpreters, Malformed, Program, Results, STEPS, Stmt, Trial,
     binds_devices, differences, evaluate, execute, generate, may_differ, of_seed, shrink,
     statements,
 };
@@ -85,10 +85,11 @@ fn tickets_of_a_counter_are_all_used_alike() {
         };
         drawn += 1;
         let with = |factor| {
-            let (from, scalar, mut draw) = ticket;
-            draw.factor = factor;
+            let (from, scalar, draw) = ticket;
+            let draws = [draw, Draw { factor, ..draw }];
+            let tickets = draws.map(|draw| Stmt::Ticket { from, scalar, draw });
             let mut more = program.clone();
-            more.main.insert(0, Stmt::Ticket { from, scalar, draw });
+            more.main.splice(..0, tickets);
             evaluate(&more, STEPS).map(|_| ())
         };
         assert_eq!(with(ticket.2.factor), Ok(()), "seed {seed}");

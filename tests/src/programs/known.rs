@@ -134,3 +134,45 @@ fn names(expr: &Expr, id: Id) -> bool {
         _ => false,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_break_by_the_counter_of_its_own_loop_counts() {
+        let condition = |id| Expr {
+            ty: BOOL,
+            kind: ExprKind::Unary(
+                Unary::Not,
+                Box::new(Expr {
+                    ty: BOOL,
+                    kind: ExprKind::Name(id),
+                }),
+            ),
+        };
+        let leave = |id| Stmt::If(condition(id), vec![Stmt::Break], Vec::new());
+        let repeat = |stmt| {
+            vec![Stmt::Block(vec![Stmt::While {
+                id: 3,
+                trips: 2,
+                condition: condition(3),
+                body: vec![stmt],
+            }])]
+        };
+        let of_switch = |stmt| {
+            let case = Case {
+                values: Vec::new(),
+                default: true,
+                body: vec![stmt],
+            };
+            Stmt::Switch(Expr::literal(Scalar::U32, 0), vec![case])
+        };
+        assert!(in_block(&repeat(leave(3))));
+        assert!(in_block(&repeat(Stmt::Block(vec![leave(3)]))));
+        assert!(!in_block(&repeat(leave(4))));
+        // It leaves the `switch`.
+        assert!(!in_block(&repeat(of_switch(leave(3)))));
+        assert!(!in_block(&vec![leave(3)]));
+    }
+}

@@ -6,7 +6,7 @@ use super::grammar::*;
 
 /// Something that drivers do otherwise.
 struct Habit {
-    /// Parts of the drivers' names; of every driver's, if empty.
+    /// Parts of the drivers' names; an empty one is part of all.
     drivers: &'static [&'static str],
     /// Whether it can show in a program's results.
     shows: fn(&Program, &Evaluation) -> bool,

@@ -191,7 +191,7 @@ impl<N: Number> TieredStep<N> for Store {
                 }
             }
             let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
-            put::<I, LANES>(texture, &index, &channels);
+            put::<I>(texture, &index, &channels);
             if let (true, Some(wide)) = (N::WIDE, texture.wide) {
                 wide::store::<I, N>(state, wide, texture.desc().format, &index, value, chunk);
             }

@@ -9,7 +9,8 @@ use etalon_core::Format;
 use super::isa::Isa;
 use super::lanes::BLOCK;
 use crate::memory::{Channels, Texels, TextureView, decode, encode, unorm8, unorm8_codes};
-use crate::num::{f16_to_f32, f32_to_f16};
+use crate::num::f16_to_f32;
+use crate::registers::LANES;
 
 /// Stands for a texel outside: no texture has so many.
 pub(super) const OUTSIDE: u32 = u32::MAX;
@@ -179,25 +180,6 @@ fn from_halves<I: Isa, const K: usize>(bits: &[u16; K], out: &mut [u32; K]) {
     }
 }
 
-/// The binary16 nearest to values, given as bits.
-#[inline(always)]
-fn to_halves<I: Isa, const K: usize>(values: &[u32; K]) -> [u16; K] {
-    let mut out = [0; K];
-    let (blocks, rest) = values.as_chunks::<BLOCK>();
-    let (to, last) = out.as_chunks_mut::<BLOCK>();
-    for (block, to) in blocks.iter().zip(to) {
-        let mut values = [0.0; BLOCK];
-        for k in 0..BLOCK {
-            values[k] = f32::from_bits(block[k]);
-        }
-        *to = I::to_halves(values);
-    }
-    for (bits, to) in rest.iter().zip(last) {
-        *to = f32_to_f16(f32::from_bits(*bits)) as u16;
-    }
-    out
-}
-
 /// The wanted channels of texels of four binary16.
 #[inline(always)]
 fn fetch_halves<I: Isa, const K: usize>(
@@ -239,31 +221,21 @@ fn fetch_halves<I: Isa, const K: usize>(
 
 /// Writes texels of four binary16.
 #[inline(always)]
-fn put_halves<I: Isa, const K: usize>(
-    texels: &[AtomicU64],
-    index: &[u32; K],
-    channels: &Channels<K>,
-) {
-    let mut words = [0; K];
-    let mut halves = [[0; K]; 4];
-    for (halves, channel) in halves.iter_mut().zip(channels) {
-        *halves = to_halves::<I, K>(channel);
-    }
-    let (to, rest) = words.as_chunks_mut::<BLOCK>();
+fn put_halves<I: Isa>(texels: &[AtomicU64], index: &[u32; LANES], channels: &Channels<LANES>) {
+    let mut words = [0; LANES];
+    let (to, _) = words.as_chunks_mut::<BLOCK>();
     for (block, to) in to.iter_mut().enumerate() {
         let mut parts = [[0; BLOCK]; 4];
-        for (part, halves) in parts.iter_mut().zip(&halves) {
-            part.copy_from_slice(&halves[block * BLOCK..][..BLOCK]);
+        for (part, channel) in parts.iter_mut().zip(channels) {
+            let mut values = [0.0; BLOCK];
+            for k in 0..BLOCK {
+                values[k] = f32::from_bits(channel[block * BLOCK + k]);
+            }
+            *part = I::to_halves(values);
         }
         *to = I::join(parts);
     }
-    let first = K - rest.len();
-    for (k, word) in rest.iter_mut().enumerate() {
-        for (part, halves) in halves.iter().enumerate() {
-            *word |= u64::from(halves[first + k]) << (16 * part);
-        }
-    }
-    store8::<I, K>(texels, index, &words);
+    store8::<I, LANES>(texels, index, &words);
 }
 
 /// `$out[c] = $channel` for each channel that is wanted.
@@ -386,35 +358,37 @@ fn words<const K: usize>(texels: &Texels, index: &[u32; K]) -> [[u64; K]; 2] {
 
 /// Writes texels where the index is inside.
 #[inline(always)]
-pub(super) fn put<I: Isa, const K: usize>(
+pub(super) fn put<I: Isa>(
     texture: &TextureView<'_>,
-    index: &[u32; K],
-    channels: &Channels<K>,
+    index: &[u32; LANES],
+    channels: &Channels<LANES>,
 ) {
     let format = texture.desc().format;
     match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            put_halves::<I, K>(texels, index, channels);
+            put_halves::<I>(texels, index, channels);
         }
         (Texels::B4(texels), Format::Rgba8Unorm) => {
-            let mut word = [0; K];
+            let mut word = [0; LANES];
             unorm8_codes(channels, &mut word);
-            store4::<I, K>(texels, index, &word);
+            store4::<I, LANES>(texels, index, &word);
         }
         (Texels::B4(texels), Format::R32Float | Format::R32Uint | Format::R32Sint) => {
-            store4::<I, K>(texels, index, &channels[0]);
+            store4::<I, LANES>(texels, index, &channels[0]);
         }
         _ => {
-            let mut words = [[0; K]; 2];
+            let mut words = [[0; LANES]; 2];
             encode(format, channels, &mut words);
             let [low, high] = words;
             match texture.texels {
                 Texels::B1(texels) => store(texels, index, &low.map(|word| word as u8)),
                 Texels::B2(texels) => store(texels, index, &low.map(|word| word as u16)),
-                Texels::B4(texels) => store4::<I, K>(texels, index, &low.map(|word| word as u32)),
-                Texels::B8(texels) => store8::<I, K>(texels, index, &low),
+                Texels::B4(texels) => {
+                    store4::<I, LANES>(texels, index, &low.map(|word| word as u32))
+                }
+                Texels::B8(texels) => store8::<I, LANES>(texels, index, &low),
                 Texels::B16(texels) => {
-                    for k in 0..K {
+                    for k in 0..LANES {
                         let at = index[k] as usize * 2;
                         if let Some([l, h]) = texels.get(at..at + 2) {
                             l.put(low[k]);

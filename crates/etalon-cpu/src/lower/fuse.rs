@@ -91,8 +91,8 @@ pub(super) fn superinstructions(flat: &mut Flat) {
     }
 }
 
-/// Limits that are literals, as most are, need no care for NaN: that takes three
-/// times as long as the comparison.
+/// Limits that are literals, as most are, need no care for NaN, which costs more than
+/// the comparison itself.
 fn know_limits(flat: &mut Flat) {
     let is_number = |reg: &Reg| {
         let constant = flat.regs[reg.0 as usize].constant;

@@ -109,9 +109,15 @@ pub(crate) trait Number: Lane + Operands {
     /// The other operand when one is NaN, the second when they are equal.
     fn max(self, other: Self) -> Self;
     /// [`Number::min`] for a limit that is not NaN.
-    fn at_most(self, limit: Self) -> Self;
+    #[inline(always)]
+    fn at_most(self, limit: Self) -> Self {
+        if self.lt(limit) { self } else { limit }
+    }
     /// [`Number::max`] for a limit that is not NaN.
-    fn at_least(self, limit: Self) -> Self;
+    #[inline(always)]
+    fn at_least(self, limit: Self) -> Self {
+        if limit.lt(self) { self } else { limit }
+    }
     fn pow(self, other: Self) -> Self;
     fn atan2(self, other: Self) -> Self;
     fn ldexp(self, exponent: i32) -> Self;

@@ -52,14 +52,6 @@ impl Number for f32 {
         Number::select(mask((self > other) | other.is_nan()), self, other)
     }
     #[inline(always)]
-    fn at_most(self, limit: Self) -> Self {
-        if self < limit { self } else { limit }
-    }
-    #[inline(always)]
-    fn at_least(self, limit: Self) -> Self {
-        if self > limit { self } else { limit }
-    }
-    #[inline(always)]
     fn pow(self, other: Self) -> Self {
         pow(self, other)
     }

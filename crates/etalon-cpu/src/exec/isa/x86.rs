@@ -5,44 +5,59 @@ use std::mem::transmute;
 
 use super::{BLOCK, Isa};
 
+/// Stores of all tiers.
+macro_rules! stores_in_runs {
+    () => {
+        #[inline(always)]
+        unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
+            // SAFETY: the caller's promise.
+            unsafe { store_runs(words, index, bits) };
+        }
+
+        #[inline(always)]
+        unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
+            // SAFETY: the caller's promise.
+            unsafe { store_runs(words, index, bits) };
+        }
+    };
+}
+
+/// Loads and stores without gathers or permutations across registers. Gathers of
+/// AVX2 are no faster.
+macro_rules! with_sse2 {
+    () => {
+        #[inline(always)]
+        unsafe fn load4(words: *const u32, _: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
+            // SAFETY: the caller's promise.
+            unsafe { load_runs(words, index) }
+        }
+
+        #[inline(always)]
+        unsafe fn load8(words: *const u64, _: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
+            // SAFETY: the caller's promise.
+            unsafe { load_pairs(words, index) }
+        }
+
+        stores_in_runs!();
+
+        #[inline(always)]
+        fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
+            split_by_unpacking(words)
+        }
+
+        #[inline(always)]
+        fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
+            join_by_unpacking(parts)
+        }
+    };
+}
+
 /// What every processor of the architecture has.
 pub(crate) struct Sse2;
 
 // SAFETY: every x86-64 processor has SSE2.
 unsafe impl Isa for Sse2 {
-    #[inline(always)]
-    unsafe fn load4(words: *const u32, _: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
-        // SAFETY: the caller's promise.
-        unsafe { load_runs(words, index) }
-    }
-
-    #[inline(always)]
-    unsafe fn load8(words: *const u64, _: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
-        // SAFETY: the caller's promise.
-        unsafe { load_pairs(words, index) }
-    }
-
-    #[inline(always)]
-    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
-
-    #[inline(always)]
-    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
-
-    #[inline(always)]
-    fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
-        split_by_unpacking(words)
-    }
-
-    #[inline(always)]
-    fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
-        join_by_unpacking(parts)
-    }
+    with_sse2!();
 }
 
 /// AVX2 and F16C.
@@ -50,29 +65,7 @@ pub(crate) struct Avx2;
 
 // SAFETY: AVX2 and F16C, which the tier has.
 unsafe impl Isa for Avx2 {
-    #[inline(always)]
-    unsafe fn load4(words: *const u32, _: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
-        // SAFETY: the caller's promise.
-        unsafe { load_runs(words, index) }
-    }
-
-    #[inline(always)]
-    unsafe fn load8(words: *const u64, _: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
-        // SAFETY: the caller's promise. Gathers of AVX2 are no faster.
-        unsafe { load_pairs(words, index) }
-    }
-
-    #[inline(always)]
-    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
-
-    #[inline(always)]
-    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
+    with_sse2!();
 
     #[inline(always)]
     fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
@@ -95,16 +88,6 @@ unsafe impl Isa for Avx2 {
                 _mm256_cvtps_ph::<NEAREST>(high),
             ])
         }
-    }
-
-    #[inline(always)]
-    fn split(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
-        split_by_unpacking(words)
-    }
-
-    #[inline(always)]
-    fn join(parts: [[u16; BLOCK]; 4]) -> [u64; BLOCK] {
-        join_by_unpacking(parts)
     }
 }
 
@@ -150,17 +133,7 @@ unsafe impl Isa for Avx512 {
         }
     }
 
-    #[inline(always)]
-    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
-
-    #[inline(always)]
-    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
-        // SAFETY: the caller's promise.
-        unsafe { store_runs(words, index, bits) };
-    }
+    stores_in_runs!();
 
     #[inline(always)]
     fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
@@ -232,7 +205,7 @@ unsafe impl Isa for Avx512 {
 
 /// Words at eight indices, of which `first` is the first one. Mostly they are of
 /// one row of a texture, next to each other: two loads and a permutation then
-/// take half of a gather's time.
+/// cost less than a gather.
 ///
 /// # Safety
 /// As for [`Isa::load8`], where there is AVX-512.

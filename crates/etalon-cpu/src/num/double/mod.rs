@@ -113,14 +113,6 @@ impl Number for f64 {
         choose((self > other) | other.is_nan(), self, other)
     }
     #[inline(always)]
-    fn at_most(self, limit: Self) -> Self {
-        if self < limit { self } else { limit }
-    }
-    #[inline(always)]
-    fn at_least(self, limit: Self) -> Self {
-        if self > limit { self } else { limit }
-    }
-    #[inline(always)]
     fn pow(self, other: Self) -> Self {
         exponential::pow(self, other)
     }

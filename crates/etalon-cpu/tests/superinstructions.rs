@@ -1,7 +1,7 @@
 //! Instructions that were joined compute what they computed apart.
 //!
 //! The same kernel twice: once as it is, so that its two instructions become
-//! one, and once with the result in between stored, so that they cannot.
+//! one, and once with the result in between read from memory, so that they cannot.
 
 mod common;
 
@@ -63,6 +63,90 @@ const PAIRS: &[Pair] = &[
         "a <= b",
         "select(a, b, t && bitcast<u32>(c) == bitcast<u32>(d))",
         "leand.f",
+    ),
+    pair("f32", "f32", "a * b", "t * c", "mul3.f"),
+    pair("f32", "f32", "a + b", "floor(t)", "addfloor.f"),
+    pair("f32", "f32", "a * b + c", "floor(t)", "muladdfloor.f"),
+    pair("f32", "f32", "a - b", "abs(t)", "abssub.f"),
+    pair(
+        "f32",
+        "f32",
+        "abs(a - b)",
+        "select(c, d, t < c)",
+        "ltabssub.f",
+    ),
+    pair("f32", "f32", "max(a, 0.25)", "max(t, 1.0)", "atleast2.f"),
+    pair(
+        "f32",
+        "bool",
+        "bitcast<u32>(a) <= 0x3f800000u",
+        "select(b, c, t)",
+        "selectle.u",
+    ),
+    pair(
+        "u32",
+        "bool",
+        "a <= b",
+        "select(a, b, t | (c == d))",
+        "leor.u",
+    ),
+    pair(
+        "u32",
+        "bool",
+        "(a <= b) | (c == d)",
+        "select(a, b, !t)",
+        "notleor.u",
+    ),
+    pair("u32", "u32", "a + b", "t << (c & 31u)", "addshl"),
+    pair("u32", "u32", "a & b", "t + c", "andadd"),
+    pair(
+        "f32",
+        "u32",
+        "(bitcast<u32>(a) ^ bitcast<u32>(b)) + 127u",
+        "bitcast<f32>(t << 23u)",
+        "f.addshl",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "(bitcast<u32>(a) ^ bitcast<u32>(b)) & 0x7fffffu",
+        "bitcast<f32>(t + 0x3f800000u)",
+        "f.andadd",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "(bitcast<u32>(a) ^ bitcast<u32>(b)) & 0x7fffffu",
+        "bitcast<f32>(t)",
+        "f.and",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a)",
+        "bitcast<f32>(t - 0x800000u)",
+        "sub.f.bits",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a) & 0x7fffffu",
+        "bitcast<f32>(t | 0x3f800000u)",
+        "bitsandor",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a) & 0x80000000u",
+        "bitcast<f32>((t | bitcast<u32>(b)) ^ 1u)",
+        "mergebits",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "bitcast<u32>(a) & 0x80000000u",
+        "bitcast<f32>(t | bitcast<u32>(b))",
+        "f.mergebits",
     ),
     pair("i32", "i32", "max(a, b)", "min(t, c)", "clamp.s"),
     pair("u32", "u32", "a >> b", "t & c", "shrand"),
@@ -127,23 +211,24 @@ fn kernel(pair: &Pair, uniform: u32, apart: bool) -> String {
             }
         })
         .collect();
-    let stored = match *between {
-        "bool" => "u32(t)",
-        "f32" => "bitcast<u32>(t)",
-        _ => "u32(t)",
+    let (stored, loaded) = match *between {
+        "bool" => ("select(3u, 2u, first)", "result[id.x + 256u] == 2u"),
+        "f32" => ("bitcast<u32>(first)", "bitcast<f32>(result[id.x + 256u])"),
+        "i32" => ("u32(first)", "i32(result[id.x + 256u])"),
+        _ => ("first", "result[id.x + 256u]"),
     };
-    let stored = if apart {
-        format!("result[id.x + 256u] = {stored};\n")
+    let through_memory = if apart {
+        format!("result[id.x + 256u] = {stored};\nlet t = {loaded};\n")
     } else {
-        String::new()
+        "let t = first;\n".to_owned()
     };
     format!(
         "@group(0) @binding(0) var<storage> data: array<u32, 64>;
          @group(0) @binding(1) var<storage, read_write> result: array<u32, 512>;
          @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
              {operands}
-             let t: {between} = {first};
-             {stored}
+             let first: {between} = {first};
+             {through_memory}
              let r: {ty} = {second};
              result[id.x] = bitcast<u32>(r);
          }}"
@@ -310,5 +395,92 @@ fn operands_that_change_in_between_are_read_in_time() {
             sum = sum.wrapping_add((masked | x).wrapping_add(i));
         }
         assert_eq!(got, sum);
+    }
+}
+
+/// What `max` gives, as `Number::max` says.
+fn max(a: f32, b: f32) -> f32 {
+    if a > b || b.is_nan() { a } else { b }
+}
+
+/// Results that cannot be NaN, whatever they are computed from, are limits that
+/// need no care; others are not.
+#[test]
+fn computed_limits_need_care_only_where_they_may_be_nan() {
+    let values = [
+        0.0_f32,
+        -0.0,
+        1.0,
+        -1.0,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::NAN,
+        -f32::NAN,
+        1e-40,
+        f32::MAX,
+    ];
+    let capped = |x: f32| f32::from_bits((x.to_bits() & 0x7fff_ffff).min(0x7f80_0000));
+    type Limit = fn(f32) -> f32;
+    let cases: [(&str, Option<Limit>); 8] = [
+        ("min(b, 1.0)", Some(|b| if b < 1.0 { b } else { 1.0 })),
+        (
+            "-abs(min(b, 1.0))",
+            Some(|b| -if b < 1.0 { b.abs() } else { 1.0 }),
+        ),
+        ("f32(i32(id.x) - 5)", None),
+        (
+            "bitcast<f32>(min(bitcast<u32>(b) & 0x7fffffffu, 0x7f800000u))",
+            None,
+        ),
+        ("select(2.0, min(b, 1.0), a < 1.0)", None),
+        ("b", Some(|b| b)),
+        (
+            "min(b, 1.0) * 0.0",
+            Some(|b| if b < 1.0 { b * 0.0 } else { 0.0 }),
+        ),
+        ("select(b, 2.0, a < 1.0)", None),
+    ];
+    for (case, (limit, _)) in cases.iter().enumerate() {
+        let wgsl = format!(
+            "@group(0) @binding(0) var<storage> data: array<f32>;
+             @group(0) @binding(1) var<storage, read_write> result: array<u32>;
+             @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+                 let a = data[id.x / {count}u % {count}u];
+                 let b = data[id.x % {count}u];
+                 result[id.x] = bitcast<u32>(max(a, {limit}));
+             }}",
+            count = values.len()
+        );
+        let listing = program(&wgsl).to_string();
+        let careful = listing.contains(" max.f");
+        assert_eq!(careful, case >= 5, "{limit}:\n{listing}");
+        let data = values.map(f32::to_bits);
+        for (k, got) in run_buffers(&wgsl, &data, 128, 2).into_iter().enumerate() {
+            let (a, b) = (
+                values[k / values.len() % values.len()],
+                values[k % values.len()],
+            );
+            let limit = match (case, cases[case].1) {
+                (_, Some(limit)) => limit(b),
+                (2, _) => k as f32 - 5.0,
+                (3, _) => capped(b),
+                (4, _) if a < 1.0 => {
+                    if b < 1.0 {
+                        b
+                    } else {
+                        1.0
+                    }
+                }
+                (7, _) if a >= 1.0 || a.is_nan() => b,
+                _ => 2.0,
+            };
+            let want = max(a, limit);
+            let got = f32::from_bits(got);
+            assert!(
+                got.to_bits() == want.to_bits() || got.is_nan() && want.is_nan(),
+                "{}: max({a:?}, {limit:?}) is {got:?}, not {want:?}",
+                cases[case].0
+            );
+        }
     }
 }

@@ -190,7 +190,11 @@ impl<N: Number> TieredStep<N> for Store {
                     index[k] |= !active[k];
                 }
             }
-            let channels = std::array::from_fn(|channel| state.bits(value[channel], chunk));
+            // Not by a closure, which would not be compiled for the tier.
+            let mut channels = [[0; LANES]; 4];
+            for (channel, value) in channels.iter_mut().zip(value) {
+                *channel = state.bits(*value, chunk);
+            }
             put::<I>(texture, &index, &channels);
             if let (true, Some(wide)) = (N::WIDE, texture.wide) {
                 wide::store::<I, N>(state, wide, texture.desc().format, &index, value, chunk);

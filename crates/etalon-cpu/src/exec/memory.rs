@@ -31,23 +31,37 @@ impl<N: Number> Step<N> for InputStep {
             return;
         };
         let axis = |axis: u8| usize::from(axis.min(2));
-        let lanes = match input {
-            Input::BatchedWorkgroupX => {
-                for chunk in 0..state.chunks {
-                    state.set_ints(to, chunk, &[state.workgroup_x(chunk); LANES]);
-                }
-                return;
+        let local = state.local_ids;
+        let (lanes, base): (_, [u32; 2]) = match input {
+            // The first workgroup's, and the difference of one to the next.
+            Input::BatchedWorkgroupX => (None, [state.workgroup[0], 1]),
+            Input::GlobalId { axis: a, size } => {
+                let first = state.workgroup[axis(a)].wrapping_mul(size);
+                let step = if a == 0 { size } else { 0 };
+                (Some(&local.ids[axis(a)]), [first, step])
             }
-            Input::LocalId(a) => &state.local_ids.ids[axis(a)],
-            Input::LocalIndex => &state.local_ids.ids[3],
-            Input::ActiveLanes => &state.local_ids.active,
+            Input::LocalId(a) => (Some(&local.ids[axis(a)]), [0; 2]),
+            Input::LocalIndex => (Some(&local.ids[3]), [0; 2]),
+            Input::ActiveLanes => (Some(&local.active), [0; 2]),
             Input::WorkgroupId(a) => return state.set_ints(to, 0, &[state.workgroup[axis(a)]]),
             Input::NumWorkgroups(a) => return state.set_ints(to, 0, &[state.workgroups[axis(a)]]),
             Input::SubgroupSize => return state.set_ints(to, 0, &[state.subgroup_size]),
         };
+        let [first, step] = base;
         for chunk in 0..state.chunks {
-            let lanes = lanes[state.local_chunk(chunk)].0;
-            state.set_ints(to, chunk, &lanes);
+            let base = first.wrapping_add(state.group_in_batch(chunk).wrapping_mul(step));
+            let at = state.at(to.number, chunk);
+            let local = state.local_chunk(chunk);
+            let to = &mut state.registers.ints[at].0;
+            match lanes {
+                Some(lanes) => {
+                    let lanes = &lanes[local].0;
+                    for k in 0..LANES {
+                        to[k] = base.wrapping_add(lanes[k]);
+                    }
+                }
+                None => to.fill(base),
+            }
         }
     }
 }
@@ -81,11 +95,11 @@ impl<N: Number, const K: usize> Step<N> for Table<K> {
         let table = &state.code.resources.tables[table as usize];
         for chunk in 0..rounds::<N, K>(state) {
             let index: [u32; K] = state.ints(inst.operands[0], chunk);
-            state.set_bits::<K>(
-                to,
-                chunk,
-                &index.map(|index| table.get(index as usize).copied().unwrap_or(0)),
-            );
+            let mut bits = [0; K];
+            for k in 0..K {
+                bits[k] = table.get(index[k] as usize).copied().unwrap_or(0);
+            }
+            state.set_bits(to, chunk, &bits);
         }
     }
 }
@@ -119,12 +133,15 @@ pub(super) fn indices<N: Number, const K: usize>(
     computed: Option<&Slot>,
     chunk: usize,
 ) -> [usize; K] {
-    match computed {
-        Some(&slot) => state
-            .ints::<K>(slot, chunk)
-            .map(|index| offset as usize + index as usize),
-        None => [offset as usize; K],
+    // Loops, here and below: what is passed a closure is not compiled for the tier.
+    let mut indices = [offset as usize; K];
+    if let Some(&slot) = computed {
+        let index: [u32; K] = state.ints(slot, chunk);
+        for k in 0..K {
+            indices[k] += index[k] as usize;
+        }
     }
+    indices
 }
 
 struct BufferLoad<const K: usize>;
@@ -145,17 +162,19 @@ impl<N: Number, const K: usize> Step<N> for BufferLoad<K> {
             let index = indices::<N, K>(state, offset, inst.operands.first(), chunk);
             // Indices are clamped where they are computed; this is for buffers
             // that are smaller than declared.
-            let bits = index.map(|index| {
-                words
-                    .get(index)
-                    .map_or(0, |word| word.load(Ordering::Relaxed))
-            });
+            let mut bits = [0; K];
+            for k in 0..K {
+                if let Some(word) = words.get(index[k]) {
+                    bits[k] = word.load(Ordering::Relaxed);
+                }
+            }
             match wide {
                 None => state.set_bits(to, chunk, &bits),
                 Some(wide) => {
-                    let mut doubles = bits.map(|bits| f64::from(f32::from_bits(bits)));
+                    let mut doubles = [0.0; K];
                     for k in 0..K {
-                        doubles[k] = wide.get(index[k]).unwrap_or(doubles[k]);
+                        let single = f64::from(f32::from_bits(bits[k]));
+                        doubles[k] = wide.get(index[k]).unwrap_or(single);
                     }
                     state.set_both(to, chunk, &bits, &doubles);
                 }
@@ -366,36 +385,39 @@ impl<N: Number, const K: usize> Step<N> for MemoryLoad<K> {
             let index = indices::<N, K>(state, slot, inst.operands.first(), chunk);
             match (memory, class) {
                 (Memory::Workgroup, Class::Float) => {
-                    let lanes = index.map(|index| {
-                        state
-                            .workgroup_floats
-                            .get(index)
-                            .copied()
-                            .unwrap_or_default()
-                    });
+                    let mut lanes = [N::default(); K];
+                    for k in 0..K {
+                        if let Some(value) = state.workgroup_floats.get(index[k]) {
+                            lanes[k] = *value;
+                        }
+                    }
                     state.set_floats(to, chunk, &lanes);
                 }
                 (Memory::Workgroup, Class::Int) => {
-                    let lanes =
-                        index.map(|index| state.workgroup_ints.get(index).copied().unwrap_or(0));
+                    let mut lanes = [0; K];
+                    for k in 0..K {
+                        if let Some(value) = state.workgroup_ints.get(index[k]) {
+                            lanes[k] = *value;
+                        }
+                    }
                     state.set_ints(to, chunk, &lanes);
                 }
                 (Memory::Private, Class::Float) => {
-                    let lanes: [N; K] = std::array::from_fn(|k| {
-                        state
-                            .private_floats
-                            .get(index[k] * chunks + chunk)
-                            .map_or_else(N::default, |lanes| N::get(lanes, k))
-                    });
+                    let mut lanes = [N::default(); K];
+                    for k in 0..K {
+                        if let Some(value) = state.private_floats.get(index[k] * chunks + chunk) {
+                            lanes[k] = N::get(value, k);
+                        }
+                    }
                     state.set_floats(to, chunk, &lanes);
                 }
                 (Memory::Private, Class::Int) => {
-                    let lanes: [u32; K] = std::array::from_fn(|k| {
-                        state
-                            .private_ints
-                            .get(index[k] * chunks + chunk)
-                            .map_or(0, |lanes| lanes.0[k])
-                    });
+                    let mut lanes = [0; K];
+                    for k in 0..K {
+                        if let Some(value) = state.private_ints.get(index[k] * chunks + chunk) {
+                            lanes[k] = value.0[k];
+                        }
+                    }
                     state.set_ints(to, chunk, &lanes);
                 }
             }

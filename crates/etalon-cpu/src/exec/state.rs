@@ -109,10 +109,10 @@ impl<'a, N: Number> State<'a, N> {
         (self.first_chunk + chunk) % self.local_ids.active.len()
     }
 
-    /// `workgroup_id.x` of a chunk of the batch.
+    /// Which of the batch's workgroups, next to each other in x, a chunk is of.
     #[inline(always)]
-    pub(crate) fn workgroup_x(&self, chunk: usize) -> u32 {
-        self.workgroup[0] + ((self.first_chunk + chunk) / self.local_ids.active.len()) as u32
+    pub(crate) fn group_in_batch(&self, chunk: usize) -> u32 {
+        ((self.first_chunk + chunk) / self.local_ids.active.len()) as u32
     }
 
     /// Where a chunk of a register of lanes is.

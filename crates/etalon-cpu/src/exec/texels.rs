@@ -46,10 +46,12 @@ word!(AtomicU64, u64);
 /// Whether every index, `per` words each, is in `words`.
 #[inline(always)]
 fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> bool {
-    let last = index
-        .iter()
-        .fold(0_u32, |last, &i| if i > last { i } else { last });
-    (last as usize + 1).saturating_mul(per) <= words.len()
+    let count = u32::try_from(words.len() / per).unwrap_or(u32::MAX);
+    let mut outside = false;
+    for k in 0..K {
+        outside |= index[k] >= count;
+    }
+    !outside
 }
 
 /// The words at `index`, zero outside.
@@ -205,15 +207,13 @@ fn fetch_halves<I: Isa, const K: usize>(
     for (block, index) in blocks.iter().enumerate() {
         // SAFETY: all indices were seen to be inside, and atomics are laid out
         // as what they hold.
-        let words = unsafe { I::load8(texels.as_ptr().cast(), texels.len(), *index) };
-        let parts = I::split(words);
+        let parts = unsafe { I::load_parts(texels.as_ptr().cast(), texels.len(), *index) };
+        // Decoding all takes less time than asking which are wanted.
         for channel in 0..4 {
-            if wanted[channel] {
-                let values = I::from_halves(parts[channel]);
-                let to = &mut out[channel][block * BLOCK..][..BLOCK];
-                for k in 0..BLOCK {
-                    to[k] = values[k].to_bits();
-                }
+            let values = I::from_halves(parts[channel]);
+            let to = &mut out[channel][block * BLOCK..][..BLOCK];
+            for k in 0..BLOCK {
+                to[k] = values[k].to_bits();
             }
         }
     }
@@ -262,8 +262,8 @@ macro_rules! halves {
     };
 }
 
-/// Reads the channels that `wanted` asks for; the others are left alone. All
-/// are zero outside.
+/// Reads the channels that `wanted` asks for; in the others is anything. All are
+/// zero outside.
 #[inline(always)]
 pub(super) fn fetch<I: Isa, const K: usize>(
     texture: &TextureView<'_>,
@@ -344,13 +344,22 @@ pub(super) fn fetch<I: Isa, const K: usize>(
     }
 }
 
+#[inline(always)]
+fn widened<T: Copy + Into<u64>, const K: usize>(words: [T; K]) -> [u64; K] {
+    let mut wide = [0; K];
+    for k in 0..K {
+        wide[k] = words[k].into();
+    }
+    wide
+}
+
 /// Texels as words, whatever their size.
 #[inline(always)]
 fn words<const K: usize>(texels: &Texels, index: &[u32; K]) -> [[u64; K]; 2] {
     match texels {
-        Texels::B1(texels) => [load(texels, index).map(u64::from), [0; K]],
-        Texels::B2(texels) => [load(texels, index).map(u64::from), [0; K]],
-        Texels::B4(texels) => [load(texels, index).map(u64::from), [0; K]],
+        Texels::B1(texels) => [widened(load(texels, index)), [0; K]],
+        Texels::B2(texels) => [widened(load(texels, index)), [0; K]],
+        Texels::B4(texels) => [widened(load(texels, index)), [0; K]],
         Texels::B8(texels) => [load(texels, index), [0; K]],
         Texels::B16(texels) => load_pairs(texels, index),
     }
@@ -381,10 +390,26 @@ pub(super) fn put<I: Isa>(
             encode(format, channels, &mut words);
             let [low, high] = words;
             match texture.texels {
-                Texels::B1(texels) => store(texels, index, &low.map(|word| word as u8)),
-                Texels::B2(texels) => store(texels, index, &low.map(|word| word as u16)),
+                Texels::B1(texels) => {
+                    let mut parts = [0; LANES];
+                    for k in 0..LANES {
+                        parts[k] = low[k] as u8;
+                    }
+                    store(texels, index, &parts);
+                }
+                Texels::B2(texels) => {
+                    let mut parts = [0; LANES];
+                    for k in 0..LANES {
+                        parts[k] = low[k] as u16;
+                    }
+                    store(texels, index, &parts);
+                }
                 Texels::B4(texels) => {
-                    store4::<I, LANES>(texels, index, &low.map(|word| word as u32))
+                    let mut parts = [0; LANES];
+                    for k in 0..LANES {
+                        parts[k] = low[k] as u32;
+                    }
+                    store4::<I, LANES>(texels, index, &parts);
                 }
                 Texels::B8(texels) => store8::<I, LANES>(texels, index, &low),
                 Texels::B16(texels) => {

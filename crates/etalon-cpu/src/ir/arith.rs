@@ -241,13 +241,33 @@ instructions! {
     Add3F "add3.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).add(c);
     MulAtMostF "mulatmost.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).at_most(c);
     AddAtLeastF "addatleast.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).at_least(c);
+    AtLeast2F "atleast2.f" (a: Float, b: Float, c: Float) -> Float = a.at_least(b).at_least(c);
+    AddFloorF "addfloor.f" (a: Float, b: Float) -> Float = a.add(b).floor();
+    AddFloorStepsF "addfloor.steps.f" (a: Float, b: Float) -> Float = a.add(b).floor_in_steps();
+    MulAddFloorF "muladdfloor.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).add(c).floor();
+    MulAddFloorStepsF "muladdfloor.steps.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).add(c).floor_in_steps();
+    Mul3F "mul3.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).mul(c);
+    AbsSubF "abssub.f" (a: Float, b: Float) -> Float = a.sub(b).abs();
+    LtAbsSubF "ltabssub.f" (a: Float, b: Float, c: Float) -> Int = mask(a.sub(b).abs().lt(c));
     AddMulF "addmul.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).mul(c);
     SubMulByF "submulby.f" (a: Float, b: Float, c: Float) -> Float = a.sub(b).mul(c);
     MulMulAddF "mulmuladd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = c.mul(e).add(a.mul(b));
     MulAddAddF "muladdadd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = a.mul(b).add(c).add(e);
     SelectMulF "selectmul.f" (a: Float, b: Float, c: Int, e: Float) -> Float = N::select(c, a.mul(b), e);
+    SelectLeU "selectle.u" (a: Int, b: Int, c: Float, e: Float) -> Float = N::select(mask(a <= b), c, e);
     ClampS "clamp.s" (a: Int, b: Int, c: Int) -> Int = s(a).max(s(b)).min(s(c)) as u32;
     ShrAnd "shrand" (a: Int, b: Int, c: Int) -> Int = (a >> (b & 31)) & c;
+    NotLeUOr "notleor.u" (a: Int, b: Int, c: Int) -> Int = !(mask(a <= b) | c);
+    LeUOr "leor.u" (a: Int, b: Int, c: Int) -> Int = mask(a <= b) | c;
+    AddShl "addshl" (a: Int, b: Int, c: Int) -> Int = a.wrapping_add(b) << (c & 31);
+    AddShlToBits "f.addshl" (a: Int, b: Int, c: Int) -> Float = N::from_f32(f32::from_bits(a.wrapping_add(b) << (c & 31)));
+    AndAdd "andadd" (a: Int, b: Int, c: Int) -> Int = (a & b).wrapping_add(c);
+    AndAddToBits "f.andadd" (a: Int, b: Int, c: Int) -> Float = N::from_f32(f32::from_bits((a & b).wrapping_add(c)));
+    AndToBits "f.and" (a: Int, b: Int) -> Float = N::from_f32(f32::from_bits(a & b));
+    SubBits "sub.f.bits" (a: Float, b: Int) -> Int = a.to_f32().to_bits().wrapping_sub(b);
+    BitsAndOr "bitsandor" (a: Float, b: Int, c: Int) -> Int = (a.to_f32().to_bits() & b) | c;
+    MergeBits "mergebits" (a: Float, b: Float, c: Int) -> Int = (b.to_f32().to_bits() & c) | a.to_f32().to_bits();
+    MergeToBits "f.mergebits" (a: Float, b: Float, c: Int) -> Float = N::from_f32(f32::from_bits((b.to_f32().to_bits() & c) | a.to_f32().to_bits()));
     AndOr "andor" (a: Int, b: Int, c: Int) -> Int = (a & b) | c;
     Add3I "add3.i" (a: Int, b: Int, c: Int) -> Int = a.wrapping_add(b).wrapping_add(c);
     // `a`, but 0 if it is above `b`, and at most `c`.
@@ -306,6 +326,8 @@ impl Arith {
             Self::CeilF => Self::CeilStepsF,
             Self::TruncF => Self::TruncStepsF,
             Self::RoundF => Self::RoundStepsF,
+            Self::AddFloorF => Self::AddFloorStepsF,
+            Self::MulAddFloorF => Self::MulAddFloorStepsF,
             other => other,
         }
     }

@@ -17,6 +17,12 @@ pub(crate) enum Input {
     /// `workgroup_id.x` where a batch may hold several workgroups, next to each
     /// other in x.
     BatchedWorkgroupX,
+    /// `global_invocation_id`, by axis.
+    GlobalId {
+        axis: u8,
+        /// Invocations of a workgroup along the axis.
+        size: u32,
+    },
     /// `num_workgroups`, by axis.
     NumWorkgroups(u8),
     /// `subgroup_size`.
@@ -247,6 +253,7 @@ impl Op {
                     | Input::LocalIndex
                     | Input::ActiveLanes
                     | Input::BatchedWorkgroupX
+                    | Input::GlobalId { .. }
             ),
             Self::MemoryLoad { memory, .. } => memory == Memory::Private,
             Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } | Self::Subgroup { .. } => {
@@ -305,6 +312,7 @@ impl fmt::Display for Op {
                 Input::LocalId(a) => write!(f, "local_id.{}", axis(a)),
                 Input::LocalIndex => f.write_str("local_index"),
                 Input::WorkgroupId(a) => write!(f, "workgroup_id.{}", axis(a)),
+                Input::GlobalId { axis: a, .. } => write!(f, "global_id.{}", axis(a)),
                 Input::BatchedWorkgroupX => f.write_str("workgroup_id.x per lane"),
                 Input::NumWorkgroups(a) => write!(f, "num_workgroups.{}", axis(a)),
                 Input::SubgroupSize => f.write_str("subgroup_size"),

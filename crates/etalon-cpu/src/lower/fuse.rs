@@ -42,9 +42,18 @@ const RULES: &[Rule] = &{
         rule(AddF, MulF, 1, AddMulF),
         rule(SubF, MulF, 0, SubMulByF),
         rule(SubF, MulF, 1, SubMulByF),
+        rule(MulF, MulF, 0, Mul3F),
+        rule(MulF, MulF, 1, Mul3F),
+        // Rounding to an integer, and how far that was.
+        rule(AddF, FloorF, 0, AddFloorF),
+        rule(MulAddF, FloorF, 0, MulAddFloorF),
+        rule(SubF, AbsF, 0, AbsSubF),
+        rule(AbsSubF, LtF, 0, LtAbsSubF),
         // Limits.
         rule(AtLeastF, AtMostF, 0, ClampF),
         rule(MaxF, MaxF, 0, Max3F),
+        rule(AtLeastF, AtLeastF, 0, AtLeast2F),
+        rule(LeU, SelectF, 0, SelectLeU),
         rule(MulF, AtMostF, 0, MulAtMostF),
         rule(AddF, AtLeastF, 0, AddAtLeastF),
         rule(MulF, SelectF, 1, SelectMulF),
@@ -65,6 +74,9 @@ const RULES: &[Rule] = &{
         rule(AndBits, EqI, 1, EqAndBits),
         rule(AndBits, NeI, 0, NeAndBits),
         rule(AndBits, NeI, 1, NeAndBits),
+        rule(LeU, Or, 0, LeUOr),
+        rule(LeU, Or, 1, LeUOr),
+        rule(LeUOr, Not, 0, NotLeUOr),
         rule(LtF, And, 0, LtAnd),
         rule(LtF, And, 1, LtAnd),
         rule(LeF, And, 0, LeAnd),
@@ -76,11 +88,22 @@ const RULES: &[Rule] = &{
         rule(And, Or, 1, AndOr),
         rule(AddI, AddI, 0, Add3I),
         rule(AddI, AddI, 1, Add3I),
+        rule(AddI, Shl, 0, AddShl),
+        rule(And, AddI, 0, AndAdd),
+        rule(And, AddI, 1, AndAdd),
+        // What builds floating-point numbers from their parts.
+        rule(AddShl, BitsToF, 0, AddShlToBits),
+        rule(AndAdd, BitsToF, 0, AndAddToBits),
+        rule(And, BitsToF, 0, AndToBits),
+        rule(FToBits, SubI, 0, SubBits),
+        rule(AndBits, Or, 0, BitsAndOr),
+        rule(AndBits, Or, 1, BitsAndOr),
+        rule(FToBits, BitsAndOr, 2, MergeBits),
+        rule(MergeBits, BitsToF, 0, MergeToBits),
     ]
 };
 
 pub(super) fn superinstructions(flat: &mut Flat) {
-    know_limits(flat);
     let mut fuser = Fuser {
         uses: uses(flat),
         varying: flat.regs.iter().map(|reg| reg.varying).collect(),
@@ -88,24 +111,6 @@ pub(super) fn superinstructions(flat: &mut Flat) {
     };
     for block in &mut flat.blocks {
         fuser.block(block);
-    }
-}
-
-/// Limits that are literals, as most are, need no care for NaN, which costs more than
-/// the comparison itself.
-fn know_limits(flat: &mut Flat) {
-    let is_number = |reg: &Reg| {
-        let constant = flat.regs[reg.0 as usize].constant;
-        constant.is_some_and(|bits| !f32::from_bits(bits).is_nan())
-    };
-    for inst in flat.blocks.iter_mut().flat_map(|block| &mut block.insts) {
-        if inst.operands.get(1).is_some_and(is_number) {
-            inst.op = match inst.op {
-                Op::Arith(Arith::MinF) => Op::Arith(Arith::AtMostF),
-                Op::Arith(Arith::MaxF) => Op::Arith(Arith::AtLeastF),
-                other => other,
-            };
-        }
     }
 }
 
@@ -123,7 +128,11 @@ impl Fuser {
         for i in 0..block.insts.len() {
             while let Some((inner, inst)) = self.fused(block, i) {
                 block.insts[i] = inst;
-                dropped[inner] = true;
+                for result in block.insts[inner].results.iter().flatten() {
+                    let uses = &mut self.uses[result.0 as usize];
+                    *uses = uses.saturating_sub(1);
+                    dropped[inner] = *uses == 0;
+                }
             }
             for result in block.insts[i].results.iter().flatten() {
                 self.written[result.0 as usize] = Some(i);
@@ -138,7 +147,8 @@ impl Fuser {
         block.insts.retain(|_| !dropped.next().unwrap_or(false));
     }
 
-    /// What instruction `i` becomes with one before it, which is then dropped.
+    /// What instruction `i` becomes with one before it, whose result it then does
+    /// not read.
     fn fused(&mut self, block: &Block, i: usize) -> Option<(usize, FlatInst)> {
         let outer = &block.insts[i];
         let Op::Arith(op) = outer.op else { return None };
@@ -188,14 +198,15 @@ impl Fuser {
         Some((at, inst))
     }
 
-    /// Where in the block `reg` is computed by `op` for one reader only, from
-    /// registers that still hold what they held there.
+    /// Where in the block `reg` is computed by `op` from registers that still hold
+    /// what they held there: for one reader only, unless by a mere move, which
+    /// every reader can make for itself.
     fn computed(&self, block: &Block, reg: Reg, op: Arith) -> Option<usize> {
         let at = self.written[reg.0 as usize]?;
         let inst = &block.insts[at];
         let unchanged = |reg: &Reg| self.written[reg.0 as usize].is_none_or(|write| write < at);
         let fits = inst.op == Op::Arith(op)
-            && self.uses[reg.0 as usize] == 1
+            && (self.uses[reg.0 as usize] == 1 || op == Arith::FToBits)
             && self.varying[reg.0 as usize]
             && inst.operands.iter().all(unchanged);
         fits.then_some(at)

@@ -7,6 +7,7 @@ mod flat;
 mod flatten;
 mod fuse;
 mod liveness;
+mod numbers;
 mod uniform;
 
 pub(crate) use allocate::{Allocation, allocate};
@@ -19,6 +20,7 @@ pub(crate) fn lower(mut tree: Tree, partial: bool) -> Flat {
     liveness::prune(&mut tree);
     let uniformity = uniform::analyse(&tree);
     let mut flat = flatten::flatten(&tree, &uniformity, partial);
+    numbers::compare_numbers(&mut flat);
     fuse::superinstructions(&mut flat);
     coalesce::coalesce(&mut flat);
     flat

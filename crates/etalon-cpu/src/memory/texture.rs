@@ -24,7 +24,7 @@ pub(crate) enum Texels {
 }
 
 /// A mip level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Level {
     pub(crate) width: u32,
     pub(crate) height: u32,

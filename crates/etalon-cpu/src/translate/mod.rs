@@ -296,12 +296,9 @@ impl<'a> Translator<'a> {
                 .map(|axis| self.input(Input::NumWorkgroups(axis)))
                 .collect(),
             B::GlobalInvocationId => (0..3_u8)
-                .map(|axis| {
-                    let size = self.builder.int(size[usize::from(axis)]);
-                    let group = self.workgroup_id(axis);
-                    let first = self.builder.arith(crate::ir::Arith::MulI, &[group, size]);
-                    let local = self.local_id(axis);
-                    self.builder.arith(crate::ir::Arith::AddI, &[first, local])
+                .map(|axis| match size[usize::from(axis)] {
+                    1 => self.workgroup_id(axis),
+                    size => self.input(Input::GlobalId { axis, size }),
                 })
                 .collect(),
             B::WorkGroupSize => size.iter().map(|&s| self.builder.int(s)).collect(),

@@ -210,7 +210,7 @@ pub(super) fn invocations<N: Number>(
         let local = state.local_chunk(chunk);
         let active = &state.local_ids.active[local].0;
         let ids = &state.local_ids.ids[3][local].0;
-        let workgroup = state.workgroup_x(chunk) - state.workgroup[0];
+        let workgroup = state.group_in_batch(chunk);
         found.extend(
             (0..LANES)
                 .filter(|&lane| active[lane] & (mask[lane] ^ wanted) != 0)

@@ -58,6 +58,20 @@ pub(crate) unsafe trait Isa: 'static {
         bits
     }
 
+    /// The four 16-bit parts of the words at `index`, from the lowest on.
+    ///
+    /// # Safety
+    /// As for [`Isa::load4`].
+    #[inline(always)]
+    unsafe fn load_parts(
+        words: *const u64,
+        count: usize,
+        index: [u32; BLOCK],
+    ) -> [[u16; BLOCK]; 4] {
+        // SAFETY: the caller's promise.
+        Self::split(unsafe { Self::load8(words, count, index) })
+    }
+
     /// Writes the words at `index`; of the same ones, any.
     ///
     /// # Safety
@@ -239,6 +253,8 @@ mod tests {
                 unsafe {
                     assert_eq!(I::load4(words4.as_ptr(), COUNT, index), four);
                     assert_eq!(I::load8(words8.as_ptr(), COUNT, index), eight);
+                    let parts = I::load_parts(words8.as_ptr(), COUNT, index);
+                    assert_eq!(parts, I::split(eight));
                     I::store4(to4.as_mut_ptr(), index, four);
                     I::store8(to8.as_mut_ptr(), index, eight);
                 }

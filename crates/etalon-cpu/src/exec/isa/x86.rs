@@ -68,6 +68,30 @@ unsafe impl Isa for Avx2 {
     with_sse2!();
 
     #[inline(always)]
+    unsafe fn load_parts(
+        words: *const u64,
+        count: usize,
+        index: [u32; BLOCK],
+    ) -> [[u16; BLOCK]; 4] {
+        // SAFETY: the instructions are there; the caller's promise; the runs'
+        // last indices are of them.
+        unsafe {
+            let [low, high]: [__m256i; 2] = transmute(index);
+            let (Some(first), Some(second)) = (run(low), run(high)) else {
+                return Self::split(Self::load8(words, count, index));
+            };
+            let [red_green, blue_alpha] = parts_of_run(words.add(first));
+            let [red_green_2, blue_alpha_2] = parts_of_run(words.add(second));
+            transmute([
+                _mm256_permute2x128_si256::<0x20>(red_green, red_green_2),
+                _mm256_permute2x128_si256::<0x31>(red_green, red_green_2),
+                _mm256_permute2x128_si256::<0x20>(blue_alpha, blue_alpha_2),
+                _mm256_permute2x128_si256::<0x31>(blue_alpha, blue_alpha_2),
+            ])
+        }
+    }
+
+    #[inline(always)]
     fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
         // SAFETY: the instructions are there, see the trait; the types are
         // plain numbers of the same sizes.
@@ -91,6 +115,44 @@ unsafe impl Isa for Avx2 {
     }
 }
 
+/// Where eight words next to each other begin, if the indices are of such.
+///
+/// # Safety
+/// There is AVX2.
+#[inline(always)]
+unsafe fn run(index: __m256i) -> Option<usize> {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let first = _mm256_broadcastd_epi32(_mm256_castsi256_si128(index));
+        let steps = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+        let is_run = _mm256_cmpeq_epi32(_mm256_add_epi32(first, steps), index);
+        let first = _mm256_cvtsi256_si32(index) as u32 as usize;
+        (_mm256_movemask_epi8(is_run) == -1).then_some(first)
+    }
+}
+
+/// Of eight words of four 16-bit parts, the first two parts and the last two.
+///
+/// # Safety
+/// There is AVX2; the words are there.
+#[inline(always)]
+unsafe fn parts_of_run(words: *const u64) -> [__m256i; 2] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let low = _mm256_loadu_si256(words.cast());
+        let high = _mm256_loadu_si256(words.add(4).cast());
+        // Of words 0, 4, 1, 5 in the lower half and 2, 6, 3, 7 in the upper one,
+        // two of a part next to each other; then four.
+        let even = _mm256_unpacklo_epi16(low, high);
+        let odd = _mm256_unpackhi_epi16(low, high);
+        let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
+        [
+            _mm256_permutevar8x32_epi32(_mm256_unpacklo_epi16(even, odd), order),
+            _mm256_permutevar8x32_epi32(_mm256_unpackhi_epi16(even, odd), order),
+        ]
+    }
+}
+
 /// AVX-512 F, BW, DQ and VL.
 pub(crate) struct Avx512;
 
@@ -100,13 +162,10 @@ unsafe impl Isa for Avx512 {
     #[inline(always)]
     unsafe fn load4(words: *const u32, count: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {
         const NEAR: usize = 16;
-        const SECOND: __mmask16 = 0xff00;
-        let (first, second) = (index[0] as usize, index[8] as usize);
         // SAFETY: as for AVX2, and the caller's promise.
         unsafe {
             let lanes: __m512i = transmute(index);
-            let from = _mm512_set1_epi32(first as i32);
-            let from = _mm512_mask_set1_epi32(from, SECOND, second as i32);
+            let (first, second, from) = starts(lanes);
             let beyond = _mm512_sub_epi32(lanes, from);
             let near = _mm512_set1_epi32(NEAR as i32);
             let far = _mm512_cmpge_epu32_mask(beyond, near);
@@ -126,14 +185,37 @@ unsafe impl Isa for Avx512 {
         // SAFETY: as for AVX2, and the caller's promise.
         unsafe {
             let [low, high]: [__m256i; 2] = transmute(index);
-            transmute([
-                load_near(words, count, low, index[0]),
-                load_near(words, count, high, index[8]),
-            ])
+            transmute([load_near(words, count, low), load_near(words, count, high)])
         }
     }
 
-    stores_in_runs!();
+    #[inline(always)]
+    unsafe fn store4(words: *mut u32, index: [u32; BLOCK], bits: [u32; BLOCK]) {
+        // SAFETY: the caller's promise; the runs' last indices are of them.
+        unsafe {
+            if let Some((first, second)) = runs(index) {
+                let [low, high]: [__m256i; 2] = transmute(bits);
+                _mm256_storeu_si256(words.add(first).cast(), low);
+                _mm256_storeu_si256(words.add(second).cast(), high);
+            } else {
+                store_runs(words, index, bits);
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn store8(words: *mut u64, index: [u32; BLOCK], bits: [u64; BLOCK]) {
+        // SAFETY: as above.
+        unsafe {
+            if let Some((first, second)) = runs(index) {
+                let [low, high]: [__m512i; 2] = transmute(bits);
+                _mm512_storeu_si512(words.add(first).cast(), low);
+                _mm512_storeu_si512(words.add(second).cast(), high);
+            } else {
+                store_runs(words, index, bits);
+            }
+        }
+    }
 
     #[inline(always)]
     fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
@@ -203,17 +285,54 @@ unsafe impl Isa for Avx512 {
     }
 }
 
-/// Words at eight indices, of which `first` is the first one. Mostly they are of
-/// one row of a texture, next to each other: two loads and a permutation then
+/// Lanes of the second run.
+const SECOND: __mmask16 = 0xff00;
+
+/// The first index of each half of the lanes: as numbers, and in every lane of
+/// its half. Not by way of memory, where the lanes may have come just now.
+///
+/// # Safety
+/// There is AVX-512.
+#[inline(always)]
+unsafe fn starts(lanes: __m512i) -> (usize, usize, __m512i) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let high = _mm512_extracti64x4_epi64::<1>(lanes);
+        let first = _mm512_cvtsi512_si32(lanes) as u32 as usize;
+        let second = _mm256_cvtsi256_si32(high) as u32 as usize;
+        let from = _mm512_broadcastd_epi32(_mm512_castsi512_si128(lanes));
+        let from = _mm512_mask_broadcastd_epi32(from, SECOND, _mm256_castsi256_si128(high));
+        (first, second, from)
+    }
+}
+
+/// Where two runs of words next to each other begin, if the indices are such.
+///
+/// # Safety
+/// There is AVX-512.
+#[inline(always)]
+unsafe fn runs(index: [u32; BLOCK]) -> Option<(usize, usize)> {
+    const STEPS: [u32; BLOCK] = [0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7];
+    // SAFETY: the caller's promise; the types are plain numbers of the same sizes.
+    unsafe {
+        let lanes: __m512i = transmute(index);
+        let (first, second, from) = starts(lanes);
+        let runs = _mm512_add_epi32(from, transmute::<[u32; BLOCK], __m512i>(STEPS));
+        (_mm512_cmpneq_epi32_mask(runs, lanes) == 0).then_some((first, second))
+    }
+}
+
+/// Words at eight indices. Mostly they are of one row of a texture, next to each other: two loads and a permutation then
 /// cost less than a gather.
 ///
 /// # Safety
 /// As for [`Isa::load8`], where there is AVX-512.
 #[inline(always)]
-unsafe fn load_near(words: *const u64, count: usize, index: __m256i, first: u32) -> __m512i {
+unsafe fn load_near(words: *const u64, count: usize, index: __m256i) -> __m512i {
     const NEAR: usize = 16;
     // SAFETY: the caller's promise.
     unsafe {
+        let first = _mm256_cvtsi256_si32(index) as u32;
         let beyond = _mm256_sub_epi32(index, _mm256_set1_epi32(first as i32));
         let far = _mm256_cmpge_epu32_mask(beyond, _mm256_set1_epi32(NEAR as i32));
         if far != 0 || first as usize + NEAR > count {

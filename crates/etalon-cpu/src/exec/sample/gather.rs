@@ -42,14 +42,15 @@ impl<N: Number, const K: usize> TieredStep<N> for Gather<K> {
         for chunk in 0..rounds::<N, K>(state) {
             let (place, _) = Place::<K>::read(state, &request, &inst.operands, chunk);
             let footprint = request.footprint(&[level; K], true, &place);
-            let texels: [Channels<K>; 4] = if access.cube {
-                request.cube_texels::<I, K>(&footprint, &place)
+            let mut texels: [Channels<K>; 4] = [[[0; K]; 4]; 4];
+            if access.cube {
+                texels = request.cube_texels::<I, K>(&footprint, &place);
             } else {
-                std::array::from_fn(|tap| {
-                    request
-                        .texels::<I, K>(&request.index(&footprint, &place, tap), &place.reference)
-                })
-            };
+                for (tap, texels) in texels.iter_mut().enumerate() {
+                    let index = request.index(&footprint, &place, tap);
+                    *texels = request.texels::<I, K>(&index, &place.reference);
+                }
+            }
             for (result, tap) in inst.results.iter().zip(ORDER) {
                 if let Some(to) = *result {
                     state.set_bits(to, chunk, &texels[tap][channel]);

@@ -46,11 +46,21 @@ impl Request<'_> {
             face,
         };
         for axis in 0..self.filtered_axes() {
-            let size = levels.map(|level| [level.width, level.height, level.depth][axis] as f32);
+            let mut size = [0.0; K];
+            for k in 0..K {
+                let Level {
+                    width,
+                    height,
+                    depth,
+                    ..
+                } = levels[k];
+                size[k] = [width, height, depth][axis] as f32;
+            }
             let (floors, weight) = unnormalised(&at[axis], &size, linear);
             let offset = self.offset[axis];
-            footprint.first[axis] =
-                floors.map(|floor| Number::to_i32(floor).saturating_add(offset));
+            for k in 0..K {
+                footprint.first[axis][k] = Number::to_i32(floors[k]).saturating_add(offset);
+            }
             footprint.weight[axis] = weight;
         }
         footprint

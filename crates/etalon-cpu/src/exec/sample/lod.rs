@@ -80,22 +80,27 @@ impl Request<'_> {
             ..
         } = self.level(0);
         let size = [width as f32, height as f32, depth as f32];
-        std::array::from_fn(|k| {
-            let square = |derivative: &[[f32; K]; 3]| {
-                let mut derivative = derivative.map(|axis| axis[k]);
+        let mut squares = [[0.0; K]; 2];
+        for (square, derivative) in squares.iter_mut().zip([along_x, along_y]) {
+            let [x, y, z] = derivative;
+            let [u, v, w] = &place.at;
+            for k in 0..K {
+                let mut derivative = [x[k], y[k], z[k]];
                 if self.cube {
-                    let [s, t] = cube::derivative(place.at.map(|axis| axis[k]), derivative);
+                    let [s, t] = cube::derivative([u[k], v[k], w[k]], derivative);
                     derivative = [s, t, 0.0];
                 }
-                let mut sum = 0.0;
                 for axis in 0..self.axes {
                     let texels = derivative[axis] * size[axis];
-                    sum += texels * texels;
+                    square[k] += texels * texels;
                 }
-                sum
-            };
-            let (x, y) = (square(along_x), square(along_y));
-            0.5 * Number::log2(if x > y { x } else { y })
-        })
+            }
+        }
+        let [x, y] = squares;
+        let mut lods = [0.0; K];
+        for k in 0..K {
+            lods[k] = 0.5 * Number::log2(if x[k] > y[k] { x[k] } else { y[k] });
+        }
+        lods
     }
 }

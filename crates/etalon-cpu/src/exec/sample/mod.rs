@@ -104,27 +104,32 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
             let lod = match *rest {
                 [level] if !sampling.gradient => {
                     if level.varying {
-                        Lod::Each(state.floats::<K>(level, chunk).map(N::to_f32))
+                        Lod::Each(state.singles(level, chunk))
                     } else {
-                        Lod::Same(state.floats::<1>(level, chunk).map(N::to_f32)[0])
+                        let [lod] = state.singles::<1>(level, chunk);
+                        Lod::Same(lod)
                     }
                 }
                 _ => {
-                    let derivative = |first: usize| {
-                        std::array::from_fn(|axis| match rest.get(first + axis) {
-                            Some(&slot) if axis < request.axes => {
-                                state.floats::<K>(slot, chunk).map(N::to_f32)
-                            }
-                            _ => [0.0; K],
-                        })
-                    };
-                    Lod::Each(request.gradient(&place, &derivative(0), &derivative(request.axes)))
+                    let mut derivatives = [[[0.0; K]; 3]; 2];
+                    let each = rest.chunks(request.axes.clamp(1, 3));
+                    for (derivative, slots) in derivatives.iter_mut().zip(each) {
+                        for (axis, slot) in derivative.iter_mut().zip(slots) {
+                            *axis = state.singles(*slot, chunk);
+                        }
+                    }
+                    let [along_x, along_y] = &derivatives;
+                    Lod::Each(request.gradient(&place, along_x, along_y))
                 }
             };
             let channels = request.sample::<I, K>(&place, &lod);
             for (result, channel) in inst.results.iter().zip(&channels) {
                 if let Some(to) = *result {
-                    state.set_bits(to, chunk, &channel.map(f32::to_bits));
+                    let mut bits = [0; K];
+                    for k in 0..K {
+                        bits[k] = channel[k].to_bits();
+                    }
+                    state.set_bits(to, chunk, &bits);
                 }
             }
         }
@@ -157,7 +162,7 @@ impl<const K: usize> Place<K> {
             reference: [0.0; K],
         };
         for (at, &slot) in place.at.iter_mut().zip(coordinates) {
-            *at = state.floats::<K>(slot, chunk).map(N::to_f32);
+            *at = state.singles(slot, chunk);
         }
         if request.layered
             && let [layer, after @ ..] = rest
@@ -168,12 +173,12 @@ impl<const K: usize> Place<K> {
         if request.compare.is_some()
             && let [reference, after @ ..] = rest
         {
-            place.reference = state.floats::<K>(*reference, chunk).map(N::to_f32);
+            place.reference = state.singles(*reference, chunk);
             if request.texture.desc().format == Format::Depth16Unorm {
                 // Fixed-point depth is compared with what it could hold.
-                place.reference = place
-                    .reference
-                    .map(|reference| Number::min(Number::max(reference, 0.0), 1.0));
+                for reference in &mut place.reference {
+                    *reference = Number::min(Number::max(*reference, 0.0), 1.0);
+                }
             }
             rest = after;
         }
@@ -238,7 +243,13 @@ impl<'a> Request<'a> {
     fn sample<I: Isa, const K: usize>(&self, place: &Place<K>, lod: &Lod<K>) -> [[f32; K]; 4] {
         let lods = match lod {
             Lod::Same(lod) => [self.clamp_lod(*lod); K],
-            Lod::Each(lods) => lods.map(|lod| self.clamp_lod(lod)),
+            Lod::Each(lods) => {
+                let mut clamped = [0.0; K];
+                for k in 0..K {
+                    clamped[k] = self.clamp_lod(lods[k]);
+                }
+                clamped
+            }
         };
         let first = lods[0].to_bits();
         let others = lods
@@ -271,12 +282,13 @@ impl<'a> Request<'a> {
         place: &Place<K>,
         lods: &[f32; K],
     ) -> [[f32; K]; 4] {
-        let mips = lods.map(|lod| self.mips(lod));
-        let steps = if mips.iter().any(|&(_, weight)| weight > 0.0) {
-            2
-        } else {
-            1
-        };
+        let (mut fine, mut weight) = ([0; K], [0.0; K]);
+        let mut between = false;
+        for k in 0..K {
+            (fine[k], weight[k]) = self.mips(lods[k]);
+            between |= weight[k] > 0.0;
+        }
+        let steps = if between { 2 } else { 1 };
         let mut result = [[0.0; K]; 4];
         // First with the filter of what is minified, then of what is not.
         for minified in [true, false] {
@@ -290,8 +302,14 @@ impl<'a> Request<'a> {
             let linear = filter == Filter::Linear;
             let mut sum = [[0.0; K]; 4];
             for step in 0..steps {
-                let levels = mips.map(|(fine, _)| self.level(fine + step));
-                let scale = mips.map(|(_, weight)| if step == 1 { weight } else { 1.0 - weight });
+                let mut levels = [Level::default(); K];
+                let mut scale = weight;
+                for k in 0..K {
+                    levels[k] = self.level(fine[k] + step);
+                    if step == 0 {
+                        scale[k] = 1.0 - weight[k];
+                    }
+                }
                 let mut both = sum;
                 self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
                 for (sum, both) in sum.iter_mut().zip(&both) {
@@ -327,16 +345,10 @@ impl<'a> Request<'a> {
             depth,
             start,
         } = level;
-        let axis = |axis: usize, size| {
-            AxisTexels::new(
-                self.sampler.address[axis],
-                &place.at[axis],
-                size,
-                self.offset[axis],
-                linear,
-            )
-        };
-        let (x, y) = (axis(0, width), axis(1, height));
+        let [x, y, ..] = &place.at;
+        let ([mode_x, mode_y, _], [dx, dy, _]) = (self.sampler.address, self.offset);
+        let x = AxisTexels::new(mode_x, x, width, dx, linear);
+        let y = AxisTexels::new(mode_y, y, height, dy, linear);
         let mut rows = y.texels;
         if self.layered {
             let last = depth as i32 - 1;

@@ -47,6 +47,9 @@ pub enum Fault {
     Scalar,
     /// Calls of other functions than those that report a failed check.
     Calls,
+    /// Calls of closures, which compilers do not compile for the handler's
+    /// instruction set.
+    Closures,
     /// Loops without a vector in them: lane by lane.
     Loops,
     /// Vectors taken apart and put together, lane by lane.
@@ -59,6 +62,7 @@ impl fmt::Display for Fault {
             Self::Width => "width",
             Self::Scalar => "scalar",
             Self::Calls => "calls",
+            Self::Closures => "closures",
             Self::Loops => "loops",
             Self::Lanes => "lanes",
         })
@@ -112,12 +116,15 @@ pub fn judge(function: &Function, tier: Tier) -> Vec<Finding> {
             scalar.iter().map(|one| one.mnemonic.as_str()).collect(),
         );
     }
-    let calls: Vec<_> = called(instructions)
+    let (closures, calls): (Vec<_>, Vec<_>) = called(instructions)
         .into_iter()
         .filter(|symbol| !is_check(symbol))
-        .collect();
+        .partition(|symbol| is_closure(symbol));
     if !calls.is_empty() {
         find(Fault::Calls, calls);
+    }
+    if !closures.is_empty() {
+        find(Fault::Closures, closures);
     }
     let narrow = loops.iter().filter(|&&(first, last)| {
         !instructions
@@ -160,6 +167,19 @@ fn called(instructions: &[Instruction]) -> Vec<&str> {
         }
     }
     calls
+}
+
+/// Whether a function is a closure, or what arrays pass one on to.
+fn is_closure(symbol: &str) -> bool {
+    [
+        "{closure",
+        "call_mut",
+        "call_once",
+        "try_map",
+        "drain_array",
+    ]
+    .iter()
+    .any(|part| symbol.contains(part))
 }
 
 /// Whether an instruction uses a register of the tier's full width.
@@ -249,6 +269,10 @@ mod tests {
             [Fault::Calls]
         );
         assert_eq!(of("  13:\tcall   r12\n"), [Fault::Calls]);
+        assert_eq!(
+            of("  13:\tcall   17 <f+0x17>\n\t\t\t14: R_X86_64_PLT32\tf::run::{closure#1}-0x4\n"),
+            [Fault::Closures]
+        );
         let through = |symbol: &str| {
             of(&format!(
                 "  13:\tmov    r12,QWORD PTR [rip+0x0]\n\t\t\t16: R_X86_64_GOTPCREL\t{symbol}-0x4\n  1a:\tcall   r12\n"

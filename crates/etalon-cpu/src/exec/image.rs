@@ -218,20 +218,25 @@ impl<N: Number, const K: usize> Step<N> for Query<K> {
             return;
         };
         for chunk in 0..rounds::<N, K>(state) {
-            let level: [u32; K] = inst
-                .operands
-                .first()
-                .map_or([0; K], |&slot| state.ints(slot, chunk));
-            let answer = level.map(|level| match query {
-                ImageQuery::Size(axis) => texture.levels.get(level as usize).map_or(0, |level| {
-                    [level.width, level.height, level.depth][usize::from(axis.min(2))]
-                }),
-                ImageQuery::Levels => texture.desc().mips,
-                ImageQuery::Layers => match texture.desc().dimension {
-                    etalon_core::resource::Dimension::Cube => texture.desc().layers() / 6,
-                    _ => texture.desc().layers(),
-                },
-            });
+            let mut answer = [0; K];
+            if let Some(&slot) = inst.operands.first() {
+                answer = state.ints(slot, chunk);
+            }
+            for level in &mut answer {
+                *level = match query {
+                    ImageQuery::Size(axis) => match texture.levels.get(*level as usize) {
+                        Some(level) => {
+                            [level.width, level.height, level.depth][usize::from(axis.min(2))]
+                        }
+                        None => 0,
+                    },
+                    ImageQuery::Levels => texture.desc().mips,
+                    ImageQuery::Layers => match texture.desc().dimension {
+                        etalon_core::resource::Dimension::Cube => texture.desc().layers() / 6,
+                        _ => texture.desc().layers(),
+                    },
+                };
+            }
             state.set_ints(to, chunk, &answer);
         }
     }

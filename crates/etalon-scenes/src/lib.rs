@@ -3,6 +3,7 @@
 //! * [`camera`]: the camera and the one projection every frame uses.
 //! * [`frame`]: what a rendered frame hands to the effects.
 //! * [`trace`](mod@trace): an exact f64 ray caster, and the true reflections in a scene.
+//! * [`model`]: meshes, materials, lights and movements that backends draw.
 //! * [`scenes`](mod@scenes): a registry of procedural scenes.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
@@ -29,6 +30,7 @@ pub mod camera;
 pub mod exr_frame;
 pub mod frame;
 mod import;
+pub mod model;
 pub mod picture;
 pub mod scenes;
 pub mod trace;

@@ -138,3 +138,49 @@ pub(crate) fn area_vector(a: [f32; 3], b: [f32; 3], c: [f32; 3]) -> DVec3 {
 pub(crate) fn vec3(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
+
+/// Makes normals of unit length; those of length 0 become the mean of the
+/// triangles around, by area, or +Y. What is not finite stays for
+/// [`Mesh::new`](super::Mesh::new) to refuse.
+pub(crate) fn mend_normals(vertices: &mut Vertices, triangles: &[[u32; 3]]) {
+    let zero = |n: &[f32; 3]| vec3(*n).length_squared() == 0.0;
+    let mut around = Vec::new();
+    if vertices.normals.iter().any(zero) {
+        around.resize(vertices.positions.len(), DVec3::ZERO);
+        for &triangle in triangles {
+            let [a, b, c] = triangle.map(|i| vertices.positions[i as usize]);
+            let area = area_vector(a, b, c);
+            for i in triangle {
+                around[i as usize] += area;
+            }
+        }
+    }
+    for (i, normal) in vertices.normals.iter_mut().enumerate() {
+        let n = vec3(*normal);
+        if !n.is_finite() {
+            continue;
+        }
+        let mended = n.try_normalize().unwrap_or_else(|| {
+            let mean = around.get(i).copied().unwrap_or(DVec3::ZERO);
+            mean.normalize_or(DVec3::Y)
+        });
+        *normal = mended.as_vec3().to_array();
+    }
+}
+
+/// Makes tangents of unit length; those of length 0 become any at a right angle
+/// to the normal. What is not finite, and `w`, stays.
+pub(crate) fn mend_tangents(vertices: &mut Vertices) {
+    for (tangent, normal) in vertices.tangents.iter_mut().zip(&vertices.normals) {
+        let [x, y, z, w] = *tangent;
+        let t = vec3([x, y, z]);
+        if !t.is_finite() {
+            continue;
+        }
+        let mended = t.try_normalize().unwrap_or_else(|| {
+            let normal = vec3(*normal).normalize_or(DVec3::Y);
+            normal.any_orthonormal_vector()
+        });
+        *tangent = mended.as_vec3().extend(w).to_array();
+    }
+}

@@ -7,6 +7,7 @@
 //! Positions, matrices and directions are right-handed with +Y up, in metres.
 //!
 //! * [`shapes`]: meshes by closed forms.
+//! * [`gltf`]: models from glTF 2.0 files.
 //! * [`flat_normals`], [`tangents`]: what meshes may come without.
 //! * [`crate::trace::TriangleScene`]: what rays see of a snapshot.
 //!
@@ -27,6 +28,7 @@
 mod animation;
 mod derive;
 mod error;
+pub mod gltf;
 mod light;
 mod material;
 mod mesh;

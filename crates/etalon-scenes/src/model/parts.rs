@@ -10,7 +10,7 @@ use super::texture::{Image, Texture};
 use crate::camera::Camera;
 
 /// Most instances of a model.
-pub const MAX_INSTANCES: usize = 1 << 24;
+pub const MAX_INSTANCES: usize = 1 << 20;
 
 /// Who looks at a model.
 #[derive(Clone, Copy, Debug, PartialEq)]

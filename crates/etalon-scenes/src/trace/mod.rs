@@ -5,7 +5,7 @@
 //! [`true_reflection`] answers, for each of its pixels, what a perfect mirror
 //! ray really meets and whether the screen could have known.
 //!
-//! [`TriangleScene`] casts rays at the triangles of a [model](crate::model)
+//! [`TriangleScene`] casts rays at the triangles of a [model](mod@crate::model)
 //! instead, and [`TriangleScene::truth`] says what a rasteriser should draw.
 
 mod bvh;

@@ -397,3 +397,40 @@ fn many_nodes_of_many_primitives_are_too_large() {
         "{result:?}"
     );
 }
+
+#[test]
+fn damaged_images_are_errors_or_images() {
+    let mut random = Random::new(22);
+    let texels: Vec<u8> = (0..48 * 40 * 3).map(|_| random.bits() as u8).collect();
+    let picture = image::RgbImage::from_raw(48, 40, texels).unwrap();
+    let (mut images, mut errors) = (0, 0);
+    for format in [image::ImageFormat::Png, image::ImageFormat::Jpeg] {
+        let mut good = std::io::Cursor::new(Vec::new());
+        picture.write_to(&mut good, format).unwrap();
+        let good = good.into_inner();
+        for round in 0..1000 {
+            let mut damaged = good.clone();
+            // Headers are the first bytes.
+            for _ in 0..1 + random.bits() % 3 {
+                let reach = if round % 2 == 0 { 700 } else { damaged.len() };
+                let place = random.bits() as usize % reach.min(damaged.len());
+                damaged[place] = random.bits() as u8;
+            }
+            if round % 7 == 0 {
+                damaged.truncate(random.bits() as usize % damaged.len());
+            }
+            let uri = base64(&damaged);
+            let json = format!(
+                r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"data:image/png;base64,{uri}"}}]}}"#
+            );
+            match decode(json.as_bytes()) {
+                Ok(_) => images += 1,
+                Err(_) => errors += 1,
+            }
+        }
+    }
+    assert!(
+        images > 100 && errors > 100,
+        "{images} images, {errors} errors"
+    );
+}

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::io::Cursor;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use ::gltf::json::Value;
 use ::gltf::json::deserialize::from_value;
@@ -9,9 +10,9 @@ use ::gltf::json::extensions::texture::TextureTransform;
 use ::gltf::json::material::AlphaMode as Mode;
 use ::gltf::json::texture::{Info, MagFilter, MinFilter, Sampler as JsonSampler, WrappingMode};
 use ::gltf::json::validation::Checked;
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 
-use super::{Fetch, GltfError, Reader, get, named, uri};
+use super::{Budget, Fetch, GltfError, Reader, get, named, uri};
 use crate::model::material::{AlphaMode, Material, TextureUse, UvTransform, Volume};
 use crate::model::parts::ModelParts;
 use crate::model::texture::{Filter, Image, MAX_IMAGE_SIDE, Sampler, Texture, Wrap};
@@ -43,39 +44,64 @@ pub(super) fn images(
             Ok(format @ (ImageFormat::Png | ImageFormat::Jpeg)) => format,
             _ => return Err(wrong("it is neither PNG nor JPEG".into())),
         };
-        let mut decoder = ImageReader::with_format(Cursor::new(&*bytes), format)
-            .into_decoder()
-            .map_err(|error| wrong(error.to_string()))?;
+        let (width, height, rgba) = decode(&bytes, format, &place, &mut reader.budget).map_err(
+            |failure| match failure {
+                Failure::TooLarge(error) => error,
+                Failure::Image(problem) => wrong(problem),
+            },
+        )?;
+        let name = named(image.name.as_ref().or(image.uri.as_ref()));
+        let name = uri::shortened(&name);
+        parts.images.push(Image::new(name, width, height, rgba)?);
+    }
+    Ok(())
+}
+
+enum Failure {
+    TooLarge(GltfError),
+    Image(String),
+}
+
+impl From<ImageError> for Failure {
+    fn from(error: ImageError) -> Self {
+        Self::Image(error.to_string())
+    }
+}
+
+/// Width, height and RGBA8 of an image. The decoders' panics, if any are left,
+/// become errors.
+fn decode(
+    bytes: &[u8],
+    format: ImageFormat,
+    place: &str,
+    budget: &mut Budget,
+) -> Result<(u32, u32, Vec<u8>), Failure> {
+    catch_unwind(AssertUnwindSafe(|| {
+        let mut decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder()?;
         let (width, height) = decoder.dimensions();
         if width > MAX_IMAGE_SIDE || height > MAX_IMAGE_SIDE {
-            return Err(wrong(format!(
+            return Err(Failure::Image(format!(
                 "it is {width}×{height}; no side may be over {MAX_IMAGE_SIDE}"
             )));
         }
         let texels = u64::from(width) * u64::from(height);
         if texels > TEXELS_PER_BYTE * bytes.len() as u64 {
-            return Err(wrong(format!(
+            return Err(Failure::Image(format!(
                 "it promises {width}×{height} texels in {} bytes",
                 bytes.len()
             )));
         }
         // As decoded, and as RGBA.
         let needed = decoder.total_bytes().saturating_add(4 * texels);
-        reader.budget.take(place, needed)?;
+        budget.take(place, needed).map_err(Failure::TooLarge)?;
         let mut limits = Limits::default();
         // What decoders need beside the result are rows.
         limits.max_alloc = Some(needed.saturating_add(1 << 26));
-        decoder
-            .set_limits(limits)
-            .map_err(|error| wrong(error.to_string()))?;
-        let decoded =
-            DynamicImage::from_decoder(decoder).map_err(|error| wrong(error.to_string()))?;
-        let rgba = decoded.into_rgba8().into_raw();
-        let name = named(image.name.as_ref().or(image.uri.as_ref()));
-        let name = uri::shortened(&name);
-        parts.images.push(Image::new(name, width, height, rgba)?);
-    }
-    Ok(())
+        decoder.set_limits(limits)?;
+        let decoded = DynamicImage::from_decoder(decoder)?;
+        Ok((width, height, decoded.into_rgba8().into_raw()))
+    }))
+    .unwrap_or_else(|_| Err(Failure::Image("its decoder fails".into())))
 }
 
 pub(super) fn textures(reader: &Reader<'_>, parts: &mut ModelParts) -> Result<(), GltfError> {

@@ -7,8 +7,10 @@ use super::error::{Check, ModelError, Place, finite};
 /// Where a texture is read: `KHR_texture_transform`.
 ///
 /// With `uv` of the set, the place is `offset + R(rotation) · (scale · uv)`,
-/// where `R(r) = ((cos r, sin r), (−sin r, cos r))`, rows first: the image turns
-/// counter-clockwise for growing angles.
+/// where `R(r) = ((cos r, sin r), (−sin r, cos r))`, rows first: places turn
+/// counter-clockwise on the image, whose v grows downward, and so the image
+/// turns clockwise on the surface. So say the extension's words and renderers do;
+/// its sample code, read by columns, has the opposite sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UvTransform {
     /// In units of the image.
@@ -283,5 +285,30 @@ impl Material {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_scaled_then_turned_then_moved() {
+        let transform = UvTransform {
+            offset: [0.25, 0.5],
+            rotation: std::f32::consts::FRAC_PI_2,
+            scale: [2.0, 3.0],
+        };
+        // To the right becomes up, and down becomes to the right.
+        for (uv, expected) in [
+            ([0.0, 0.0], [0.25, 0.5]),
+            ([1.0, 0.0], [0.25, -1.5]),
+            ([0.0, 1.0], [3.25, 0.5]),
+        ] {
+            let got = transform.apply(uv);
+            // The angle and its cosine are off by a rounding each.
+            assert!((got[0] - expected[0]).abs() < 1e-6 && (got[1] - expected[1]).abs() < 1e-6);
+        }
+        assert_eq!(UvTransform::default().apply([0.5, 2.0]), [0.5, 2.0]);
     }
 }

@@ -101,6 +101,27 @@ impl Pose {
         })
     }
 
+    /// The pose of something placed by an affine matrix: at its translation,
+    /// looking down its −Z axis, with its +Y axis upward. Scale does not count.
+    ///
+    /// # Errors
+    /// If the matrix is not finite or its axes do not give an orientation.
+    pub fn placed(matrix: DMat4) -> Result<Self, CameraError> {
+        let position = matrix.w_axis.truncate();
+        let turned = Self::look_at(
+            DVec3::ZERO,
+            -matrix.z_axis.truncate(),
+            matrix.y_axis.truncate(),
+        )?;
+        if !position.is_finite() {
+            return Err(CameraError::NotFinite {
+                what: "position",
+                value: position,
+            });
+        }
+        Ok(Self { position, ..turned })
+    }
+
     /// World position.
     #[must_use]
     pub const fn position(&self) -> DVec3 {

@@ -3,6 +3,8 @@
 //! * [`camera`]: the camera and the one projection every frame uses.
 //! * [`frame`]: what a rendered frame hands to the effects.
 //! * [`trace`](mod@trace): an exact f64 ray caster, and the true reflections in a scene.
+//! * [`model`](mod@model): meshes, materials, lights and movements that backends draw.
+//! * [`models`](mod@models): a registry of procedural models.
 //! * [`scenes`](mod@scenes): a registry of procedural scenes.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
@@ -29,10 +31,13 @@ pub mod camera;
 pub mod exr_frame;
 pub mod frame;
 mod import;
+pub mod model;
+pub mod models;
 pub mod picture;
 pub mod scenes;
 pub mod trace;
 
 pub use camera::{Camera, Pose, Projection};
 pub use frame::{Frame, FrameCamera, FrameSize};
+pub use models::{ModelEntry, model, models};
 pub use scenes::{SceneEntry, World, scene, scenes};

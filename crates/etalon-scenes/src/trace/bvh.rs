@@ -43,6 +43,13 @@ impl Bounds {
         }
     }
 
+    /// Whether some of it is on the inner side of a plane `(normal, distance)`.
+    fn reaches(&self, &(normal, distance): &(DVec3, f64)) -> bool {
+        // The corner furthest inside.
+        let corner = DVec3::select(normal.cmpgt(DVec3::ZERO), self.high, self.low);
+        normal.dot(corner) >= distance
+    }
+
     /// Where the ray enters, if that is before `limit` and it does at all.
     fn enter(&self, ray: &Ray, inverse: DVec3, limit: f64) -> Option<f64> {
         let a = (self.low - ray.origin()) * inverse;
@@ -189,6 +196,38 @@ impl Bvh {
             }
         }
     }
+
+    /// Calls `visit(index)` for primitives whose boxes reach into the region of
+    /// points `p` with `normal · p ≥ distance` for each `(normal, distance)`,
+    /// until it answers `false`. Boxes near the region's corners may be visited
+    /// without reaching into it.
+    pub(crate) fn overlapping(&self, region: &[(DVec3, f64)], mut visit: impl FnMut(u32) -> bool) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut stack = [0_u32; STACK];
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            let index = stack[height];
+            let node = &self.nodes[index as usize];
+            if !region.iter().all(|plane| node.bounds.reaches(plane)) {
+                continue;
+            }
+            if node.count > 0 {
+                for &primitive in &self.order[node.start as usize..][..node.count as usize] {
+                    if !visit(primitive) {
+                        return;
+                    }
+                }
+                continue;
+            }
+            for child in [node.start, index + 1] {
+                stack[height] = child;
+                height += 1;
+            }
+        }
+    }
 }
 
 /// Reorders the items so that the cheapest split found is at the index returned,
@@ -281,8 +320,57 @@ mod tests {
     }
 
     #[test]
+    fn every_box_that_reaches_into_a_region_is_visited() {
+        let boxes: Vec<_> = (0..512_u32)
+            .map(|index| {
+                let cell = DVec3::new(
+                    f64::from(index % 8),
+                    f64::from(index / 8 % 8),
+                    f64::from(index / 64),
+                );
+                (index, cell * 2.0, cell * 2.0 + DVec3::ONE)
+            })
+            .collect();
+        let bvh = Bvh::new(boxes.iter().copied());
+        for region in [
+            &[][..],
+            &[(DVec3::X, 4.5)],
+            &[(DVec3::X, 5.0), (DVec3::NEG_Y, -6.5), (DVec3::Z, 3.0)],
+            &[(DVec3::new(1.0, 1.0, 1.0), 40.0), (DVec3::NEG_X, -13.0)],
+            &[(DVec3::X, 100.0)],
+        ] {
+            let inside = |corner: DVec3| region.iter().all(|&(n, d)| n.dot(corner) >= d);
+            let mut expected = Vec::new();
+            for &(index, low, high) in &boxes {
+                let corners = (0..8).map(|i| {
+                    DVec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), high, low)
+                });
+                if corners.into_iter().any(inside) {
+                    expected.push(index);
+                }
+            }
+            let mut seen = Vec::new();
+            bvh.overlapping(region, |index| {
+                seen.push(index);
+                true
+            });
+            seen.sort_unstable();
+            // A leaf holds a few more boxes than those that reach into it.
+            assert!(expected.iter().all(|i| seen.binary_search(i).is_ok()));
+            assert!(seen.len() <= LEAF * expected.len(), "{region:?}: {seen:?}");
+        }
+        let mut count = 0;
+        bvh.overlapping(&[], |_| {
+            count += 1;
+            count < 3
+        });
+        assert_eq!(count, 3);
+    }
+
+    #[test]
     fn an_empty_hierarchy_has_nothing_to_visit() {
         let bvh = Bvh::new(std::iter::empty());
+        bvh.overlapping(&[], |_| unreachable!());
         bvh.traverse(
             &Ray::new(DVec3::ZERO, DVec3::Z),
             f64::INFINITY,

@@ -4,6 +4,9 @@
 //! [`trace`] renders what an engine's geometry pass would hand to the effects;
 //! [`true_reflection`] answers, for each of its pixels, what a perfect mirror
 //! ray really meets and whether the screen could have known.
+//!
+//! [`TriangleScene`] casts rays at the triangles of a [model](mod@crate::model)
+//! instead, and [`TriangleScene::truth`] says what a rasteriser should draw.
 
 mod bvh;
 mod check;
@@ -15,6 +18,8 @@ mod render;
 mod scene;
 mod shade;
 mod shape;
+mod triangles;
+mod watertight;
 
 pub(crate) use material::hash;
 pub use material::{Material, Pattern, Property};
@@ -23,3 +28,7 @@ pub use reflect::{MirrorHit, MirrorRay, Reflection, true_reflection};
 pub use render::trace;
 pub use scene::{Ambient, Light, Object, Scene, SceneBuilder, SceneError, Sky};
 pub use shape::{Mesh, Shape};
+pub use triangles::{
+    Faces, MAX_SCENE_TRIANGLES, SurfacePoint, TriangleHit, TriangleScene, TriangleSceneError,
+    Truth, TruthOptions, TruthPixel,
+};

@@ -6,6 +6,7 @@
 use glam::{DMat3, DVec3};
 
 use super::ray::Ray;
+use super::watertight::cross;
 
 /// One convex piece of a scene.
 #[derive(Clone, Debug)]
@@ -245,38 +246,12 @@ fn oriented_box(
     })
 }
 
-/// Watertight intersection after Woop, Benthin and Wald, “Watertight
-/// Ray/Triangle Intersection”, JCGT 2(1), 2013: two triangles that share an
-/// edge compute the same value for it, so no ray passes between them.
 fn triangle(ray: &Ray, corners: &[DVec3; 3], normal: DVec3) -> Option<Meeting> {
-    let d = ray.direction();
-    let kz = d.abs().max_position();
-    let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-    // Keeps the winding, and with it the signs below.
-    if d[kz] < 0.0 {
-        std::mem::swap(&mut kx, &mut ky);
-    }
-    let (sx, sy, sz) = (d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]);
-    let [a, b, c] = corners.map(|corner| corner - ray.origin());
-    let shear = |p: DVec3| (p[kx] - sx * p[kz], p[ky] - sy * p[kz]);
-    let ((ax, ay), (bx, by), (cx, cy)) = (shear(a), shear(b), shear(c));
-    let u = cx * by - cy * bx;
-    let v = ax * cy - ay * cx;
-    let w = bx * ay - by * ax;
-    let any_negative = u < 0.0 || v < 0.0 || w < 0.0;
-    let any_positive = u > 0.0 || v > 0.0 || w > 0.0;
-    let det = u + v + w;
-    if (any_negative && any_positive) || det == 0.0 {
-        return None;
-    }
-    let t = (u * sz * a[kz] + v * sz * b[kz] + w * sz * c[kz]) / det;
-    if !(t > ray.start() && t.is_finite()) {
-        return None;
-    }
-    let position = corners[0] * (u / det) + corners[1] * (v / det) + corners[2] * (w / det);
+    let crossing = cross(ray, corners)?;
+    let [u, v, w] = crossing.weights;
     Some(Meeting {
-        t,
-        position,
+        t: crossing.t,
+        position: corners[0] * u + corners[1] * v + corners[2] * w,
         normal,
         face: 0,
     })

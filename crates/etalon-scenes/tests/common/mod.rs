@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test uses its own part")]
 
 pub(crate) mod exr_files;
+pub(crate) mod gltf_files;
 pub(crate) mod shapes;
 
 use etalon_core::image::ImageData;

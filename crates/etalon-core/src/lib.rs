@@ -2,6 +2,7 @@
 //!
 //! * [`graph`]: effects declare passes over versioned textures and buffers.
 //! * [`kernel`]: WESL sources become validated, reflected naga modules.
+//! * [`raster`]: the state of draws, and what vertex kernels are fed.
 //! * [`plan`]: a graph becomes a list of steps with memory and barriers.
 //! * [`backend`]: what an executor of plans offers.
 //! * [`mod@format`], [`texel`], [`resource`], [`image`]: texels and their shapes.
@@ -16,6 +17,7 @@ pub mod graph;
 pub mod image;
 pub mod kernel;
 pub mod plan;
+pub mod raster;
 pub mod resource;
 pub mod texel;
 

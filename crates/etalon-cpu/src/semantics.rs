@@ -47,8 +47,8 @@
 //! # Conversions and bits (§8.2, §15.7.6, §17.1, §17.2)
 //!
 //! * Float to integer truncates; what is out of range gives the nearest number
-//!   that `f32` has as well, so 2147483520 for `i32` and 4294967040 for `u32` at
-//!   the upper end; NaN gives 0.
+//!   that the float's type has as well, so from `f32` 2147483520 for `i32` and
+//!   4294967040 for `u32` at the upper end, and 65504 from `f16`; NaN gives 0.
 //! * Integer to float rounds to nearest even. An integer beyond `f16`'s largest
 //!   number becomes an infinity.
 //! * `f32` to `f16` rounds to nearest even, with subnormals; from 65520 on the

@@ -48,6 +48,9 @@ impl<'a> Translator<'a> {
             .into_iter()
             .map(|value| {
                 let value = self.cast_scalar(value, from.kind, to.kind);
+                if is_half(from) && class_of(to.kind) == Class::Int && to.kind != ScalarKind::Bool {
+                    return self.at_most_half(value, to.kind);
+                }
                 // An integer's binary32 is rounded again; where that was rounded
                 // already, it is beyond binary16.
                 if is_half(to) && from.kind != ScalarKind::Bool {
@@ -57,6 +60,18 @@ impl<'a> Translator<'a> {
                 }
             })
             .collect())
+    }
+
+    /// An integer that was an `f16`, of which only an infinity is beyond the
+    /// largest one.
+    fn at_most_half(&mut self, value: Value, kind: ScalarKind) -> Value {
+        let b = &mut self.builder;
+        let (low, high) = (b.int(-65504_i32 as u32), b.int(65504));
+        if kind == ScalarKind::Uint {
+            return b.arith(Arith::MinU, &[value, high]);
+        }
+        let value = b.arith(Arith::MaxS, &[value, low]);
+        b.arith(Arith::MinS, &[value, high])
     }
 
     /// The number of another kind that has the same bits.

@@ -5,7 +5,7 @@ use etalon_tests::executors;
 use etalon_tests::operations::exceptions::known;
 use etalon_tests::operations::judge::{Judgement, Who, expectations, judge};
 use etalon_tests::operations::report::{Entry, Report};
-use etalon_tests::operations::run::{executor_name, library, run};
+use etalon_tests::operations::run::{RunError, executor_name, library, run};
 use etalon_tests::operations::table;
 
 #[test]
@@ -31,6 +31,10 @@ fn every_operation_is_as_wgsl_and_strict_arithmetic_have_it() {
             let mut interpreter: Option<Vec<u32>> = None;
             for (executor, name) in executors.iter_mut().zip(&names) {
                 let results = run(executor.as_mut(), &kernels, &operations, index, arithmetic);
+                if let Some(feature) = results.as_ref().err().and_then(RunError::lacking) {
+                    report.lacks(name, feature);
+                    continue;
+                }
                 let judgement = match results {
                     Err(error) => Judgement::without_results(error.to_string()),
                     Ok(results) => {

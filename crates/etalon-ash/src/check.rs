@@ -173,9 +173,7 @@ impl Checker<'_> {
                 bindings,
                 groups,
             } => {
-                if let Some(what) = pipeline::lacking(self.device, &kernel.0) {
-                    return Err(unsupported(&step.name, what));
-                }
+                pipeline::check(self.device, &kernel.0, &step.name)?;
                 self.bindings(step, &kernel.0, bindings)?;
                 self.groups(step, groups)
             }

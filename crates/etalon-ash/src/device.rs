@@ -149,6 +149,10 @@ impl Device {
             .image_cube_array(features.image_cube_array)
             .shader_storage_image_extended_formats(features.storage_image_extended_formats)
             .shader_storage_image_write_without_format(features.storage_image_write_without_format);
+        let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default()
+            .storage_buffer16_bit_access(features.storage_buffer_16bit_access);
+        let mut vulkan12 =
+            vk::PhysicalDeviceVulkan12Features::default().shader_float16(features.shader_float16);
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(features.synchronization2)
             .maintenance4(features.maintenance4)
@@ -177,6 +181,8 @@ impl Device {
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .enabled_features(&core)
+            .push_next(&mut vulkan11)
+            .push_next(&mut vulkan12)
             .push_next(&mut vulkan13);
         // SAFETY: the family exists and has a queue, features and extensions
         // are offered, and everything pointed to lives until the call returns.

@@ -57,6 +57,11 @@ pub struct Features {
     /// `VkPhysicalDeviceFeatures::shaderStorageImageWriteWithoutFormat`, for
     /// kernels that store to `bgra8unorm`.
     pub storage_image_write_without_format: bool,
+    /// `VkPhysicalDeviceVulkan12Features::shaderFloat16`, for kernels with `f16`.
+    pub shader_float16: bool,
+    /// `VkPhysicalDeviceVulkan11Features::storageBuffer16BitAccess`, for kernels
+    /// whose storage buffers hold `f16`.
+    pub storage_buffer_16bit_access: bool,
 }
 
 impl Features {
@@ -161,8 +166,13 @@ impl Physical {
         self.info.driver = format!("{name} {info}").trim().to_owned();
         self.max_allocation = maintenance3.max_memory_allocation_size;
         self.max_buffer = maintenance4.max_buffer_size;
+        let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default();
+        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
+        let mut features = vk::PhysicalDeviceFeatures2::default()
+            .push_next(&mut vulkan11)
+            .push_next(&mut vulkan12)
+            .push_next(&mut vulkan13);
         // SAFETY: as above.
         unsafe {
             instance
@@ -178,6 +188,8 @@ impl Physical {
             storage_image_extended_formats: core.shader_storage_image_extended_formats == vk::TRUE,
             storage_image_write_without_format: core.shader_storage_image_write_without_format
                 == vk::TRUE,
+            shader_float16: vulkan12.shader_float16 == vk::TRUE,
+            storage_buffer_16bit_access: vulkan11.storage_buffer16_bit_access == vk::TRUE,
         };
     }
 

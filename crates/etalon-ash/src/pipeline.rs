@@ -6,13 +6,14 @@ use ash::vk;
 use etalon_core::Format;
 use etalon_core::backend::BackendError;
 use etalon_core::format::StorageSupport;
-use etalon_core::kernel::{BindingKind, Kernel, SpirvOptions, ViewDimension, spirv};
+use etalon_core::kernel::{BindingKind, Kernel, Need, SpirvOptions, ViewDimension, spirv};
 use etalon_core::plan::PlannedStep;
 use etalon_core::resource::SamplerDesc;
 
 use crate::convert;
 use crate::device::{Device, Remains, count};
 use crate::error::{failed, unsupported};
+use crate::physical::Features;
 
 /// A kernel on the device.
 pub(crate) struct Pipeline {
@@ -36,10 +37,46 @@ pub(crate) const fn descriptor_type(kind: &BindingKind) -> vk::DescriptorType {
     }
 }
 
-/// What the device would have to be able to do for a kernel but is not, or
-/// `None` if it can run it.
-pub(crate) fn lacking(device: &Device, kernel: &Kernel) -> Option<String> {
+/// Refuses a kernel that the device cannot run.
+pub(crate) fn check(device: &Device, kernel: &Kernel, step: &str) -> Result<(), BackendError> {
     let features = &device.features;
+    if let Some((need, feature)) = unmet(features, &kernel.needs) {
+        return Err(BackendError::Lacking {
+            step: step.to_owned(),
+            kernel: kernel.name.clone(),
+            need: need.clone(),
+            feature,
+        });
+    }
+    match lacking(features, &device.physical.limits, kernel) {
+        Some(what) => Err(unsupported(step, what)),
+        None => Ok(()),
+    }
+}
+
+/// The first need that the features do not meet, and the one that would.
+fn unmet<'a>(features: &Features, needs: &'a [Need]) -> Option<(&'a Need, &'static str)> {
+    needs.iter().find_map(|need| {
+        let (feature, enabled) = match need {
+            Need::F16 => ("shaderFloat16", features.shader_float16),
+            Need::F16Buffer { .. } => (
+                "storageBuffer16BitAccess",
+                features.storage_buffer_16bit_access,
+            ),
+            // One that this backend does not know.
+            _ => ("none", false),
+        };
+        (!enabled).then_some((need, feature))
+    })
+}
+
+/// What the device would have to be able to do for the bindings and workgroups
+/// of a kernel but is not, or `None` if it can run it.
+fn lacking(
+    features: &Features,
+    limits: &vk::PhysicalDeviceLimits,
+    kernel: &Kernel,
+) -> Option<String> {
     for binding in &kernel.bindings {
         let (dimension, stored) = match &binding.kind {
             BindingKind::Texture { dimension, .. } => (*dimension, None),
@@ -69,7 +106,7 @@ pub(crate) fn lacking(device: &Device, kernel: &Kernel) -> Option<String> {
             ));
         }
     }
-    over_limit(&device.physical.limits, kernel)
+    over_limit(limits, kernel)
 }
 
 /// The first limit that a kernel exceeds.
@@ -173,9 +210,7 @@ impl Pipeline {
         kernel: &Kernel,
         step: &PlannedStep,
     ) -> Result<Arc<Self>, BackendError> {
-        if let Some(what) = lacking(device, kernel) {
-            return Err(unsupported(&step.name, what));
-        }
+        check(device, kernel, &step.name)?;
         let words = spirv(kernel, &spirv_options()).map_err(|error| BackendError::Kernel {
             step: step.name.clone(),
             error: Box::new(error),
@@ -204,7 +239,7 @@ impl Pipeline {
         let raw = &device.raw;
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&entries);
         // SAFETY: binding numbers are unique within a kernel, and counts are
-        // within the device's limits, which `lacking` has checked.
+        // within the device's limits, which `check` has checked.
         this.set_layout = unsafe { raw.create_descriptor_set_layout(&info, None) }
             .map_err(failed("vkCreateDescriptorSetLayout"))?;
         let layouts = [this.set_layout];
@@ -222,7 +257,7 @@ impl Pipeline {
         let raw = &self.device.raw;
         let info = vk::ShaderModuleCreateInfo::default().code(words);
         // SAFETY: the words are what naga writes for a validated module, with
-        // no capability beyond those `lacking` has found enabled.
+        // no capability beyond those `check` has found enabled.
         let module = unsafe { raw.create_shader_module(&info, None) }
             .map_err(failed("vkCreateShaderModule"))?;
         let name: Vec<u8> = kernel.entry_point.bytes().chain([0]).collect();
@@ -305,5 +340,35 @@ impl Sampler {
 impl Drop for Sampler {
     fn drop(&mut self) {
         self.device.bury(Remains::Sampler(self.raw));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_need_has_its_feature() {
+        let buffer = Need::F16Buffer {
+            binding: "data".to_owned(),
+        };
+        let needs = [Need::F16, buffer.clone()];
+        let none = Features::default();
+        let arithmetic = Features {
+            shader_float16: true,
+            ..none
+        };
+        let both = Features {
+            storage_buffer_16bit_access: true,
+            ..arithmetic
+        };
+        assert_eq!(unmet(&none, &[]), None);
+        assert_eq!(unmet(&none, &needs), Some((&Need::F16, "shaderFloat16")));
+        assert_eq!(unmet(&arithmetic, &needs[..1]), None);
+        assert_eq!(
+            unmet(&arithmetic, &needs),
+            Some((&buffer, "storageBuffer16BitAccess"))
+        );
+        assert_eq!(unmet(&both, &needs), None);
     }
 }

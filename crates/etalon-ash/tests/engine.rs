@@ -11,8 +11,9 @@ use etalon_ash::{
     TextureState,
 };
 use etalon_core::Format;
-use etalon_core::backend::{Backend, BackendError};
+use etalon_core::backend::{Backend, BackendError, Inputs};
 use etalon_core::graph::{ClearValue, Graph};
+use etalon_core::kernel::{KernelLibrary, Need};
 use etalon_core::plan::{Capture, Plan, PlanOptions, TightMemory};
 use etalon_core::resource::{BufferDesc, TextureDesc};
 
@@ -575,6 +576,45 @@ fn wrong_bindings_are_named_before_anything_is_made() {
         );
         assert_eq!(backend.counters(), before);
         engine.wait(engine.submit(commands));
+    });
+}
+
+#[test]
+fn half_floats_are_refused_where_the_engine_has_not_enabled_them() {
+    on_each(|engine| {
+        // It states no feature beyond those required.
+        let mut backend = adopt(engine, AshOptions::default());
+        let mut library = KernelLibrary::new();
+        library.add_source(
+            "test/half",
+            "enable f16;
+             @group(0) @binding(0) var<storage, read_write> halves: array<f16>;
+             @compute @workgroup_size(1) fn main() { halves[0] *= 3.0h; }",
+        );
+        let mut graph = Graph::new();
+        let halves = graph.buffer("halves", BufferDesc { bytes: 4 });
+        let halves = graph.clear_buffer(halves).unwrap();
+        let halves = graph
+            .compute("test/half")
+            .update_buffer("halves", halves)
+            .groups([1, 1, 1])
+            .unwrap()
+            .buffer("halves")
+            .unwrap();
+        graph.output_buffer("halves", halves).unwrap();
+        let plan = Plan::new(&graph, &library, &PlanOptions::default()).unwrap();
+        let error = backend.execute(&plan, &Inputs::new()).unwrap_err();
+        let BackendError::Lacking {
+            step,
+            kernel,
+            need,
+            feature,
+        } = &error
+        else {
+            panic!("{error}");
+        };
+        assert_eq!((step.as_str(), kernel.as_str()), ("test/half", "test/half"));
+        assert_eq!((need, *feature), (&Need::F16, "shaderFloat16"));
     });
 }
 

@@ -13,6 +13,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::image::ImageData;
+use crate::kernel::Need;
 use crate::plan::{MemoryModel, Plan, TightMemory};
 use crate::resource::Limits;
 
@@ -193,6 +194,21 @@ pub enum BackendError {
         step: String,
         /// The missing thing.
         what: String,
+    },
+    /// The device lacks what a kernel needs beyond what every device has.
+    #[error(
+        "step `{step}`: kernel `{kernel}` needs {need}, but the device lacks, or was made without, \
+         the feature `{feature}`"
+    )]
+    Lacking {
+        /// The step.
+        step: String,
+        /// The kernel.
+        kernel: String,
+        /// What it needs.
+        need: Need,
+        /// The device's feature that would give it, as its API spells it.
+        feature: &'static str,
     },
     /// A kernel cannot be translated for this backend.
     #[error("step `{step}`: {error}")]

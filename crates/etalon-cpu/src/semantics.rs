@@ -21,9 +21,14 @@
 //! An `f16` is computed in binary32 and rounded. For `+ - * /` and `sqrt` this
 //! is the correctly rounded result, because 24 bits of mantissa are at least
 //! twice the 11 of binary16 and two more. For other functions it is the
-//! binary32 result rounded once more. `enable f16;` is for programs made with
-//! [`Program::from_module`](crate::Program::from_module); the kernels of a
-//! graph do not have it.
+//! binary32 result rounded once more.
+//!
+//! WGSL has no integers of 16 bits. naga makes the exponent of an `f16`'s `frexp`
+//! an `i16`, and its bit casts keep the width, so that `f16` becomes `i16` or
+//! `u16`; those can be converted to other numbers, compared, selected, kept in
+//! variables and cast back, and nothing else. That is for modules given to
+//! [`Program::from_module`](crate::Program::from_module): kernels of a graph can
+//! have neither, see [`etalon_core::kernel`].
 //!
 //! # Operators
 //!
@@ -42,13 +47,15 @@
 //! # Conversions and bits (§8.2, §15.7.6, §17.1, §17.2)
 //!
 //! * Float to integer truncates; what is out of range gives the nearest number
-//!   that `f32` has as well, so 2147483520 for `i32` and 4294967040 for `u32` at
-//!   the upper end; NaN gives 0.
+//!   that the float's type has as well, so from `f32` 2147483520 for `i32` and
+//!   4294967040 for `u32` at the upper end, and 65504 from `f16`; NaN gives 0.
 //! * Integer to float rounds to nearest even. An integer beyond `f16`'s largest
 //!   number becomes an infinity.
 //! * `f32` to `f16` rounds to nearest even, with subnormals; from 65520 on the
 //!   result is an infinity.
-//! * `bitcast` keeps bits, those of NaNs included, between `f32`, `i32` and `u32`.
+//! * `bitcast` keeps bits, those of NaNs included, between `f32`, `i32` and `u32`,
+//!   and between numbers of 16 bits; but a signalling NaN of `f16` is made quiet
+//!   where it is loaded.
 //!
 //! # Numeric built-ins (§17.5)
 //!
@@ -169,7 +176,8 @@
 //! A subgroup is [`Executor::with_subgroup_size`](crate::Executor::with_subgroup_size)
 //! invocations in the order of `local_invocation_index`; the last one of a
 //! workgroup may have fewer. Only active invocations take part. Sums and
-//! products of floats start from the first one and are rounded at each step. A
+//! products of floats start from the first one and are rounded at each step, those
+//! of `f16` to binary32, and once more to binary16 at the end. A
 //! shuffle or broadcast from an invocation that is not there or not active
 //! gives 0. A quad is four consecutive invocations.
 //!
@@ -186,12 +194,11 @@
 //! # What gives a typed error
 //!
 //! [`TranslateError::Unsupported`](crate::TranslateError::Unsupported), with
-//! its place: scalars of 64 bits and integers of 16 (naga makes the exponent of
-//! an `f16`'s `frexp` one), `bitcast` of `f16`,
-//! multisampled and external textures, arrays of textures, texel formats that
-//! [`etalon_core::Format`] has not, ray queries, atomic operations on floats,
-//! cooperative matrices, and implicit levels of detail and derivatives, which
-//! validation refuses in compute shaders before.
+//! its place: scalars of 64 bits, arithmetic on integers of 16 bits, conversions to
+//! them and buffers of them, multisampled and external textures, arrays of
+//! textures, texel formats that [`etalon_core::Format`] has not, ray queries,
+//! atomic operations on floats, cooperative matrices, and implicit levels of detail
+//! and derivatives, which validation refuses in compute shaders before.
 //!
 //! [`TranslateError::Invalid`](crate::TranslateError::Invalid): overrides that
 //! were not resolved, texel offsets out of range.

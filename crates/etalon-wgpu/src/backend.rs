@@ -54,7 +54,8 @@ impl WgpuBackend {
     /// [`TIMESTAMP_QUERY_INSIDE_ENCODERS`](wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS)
     /// executions are timed by the device, if it is not a software one; with
     /// [`PASSTHROUGH_SHADERS`](wgpu::Features::PASSTHROUGH_SHADERS) on Vulkan
-    /// strict arithmetic is kept; with
+    /// strict arithmetic is kept; with [`SHADER_F16`](wgpu::Features::SHADER_F16)
+    /// kernels may have `f16`; with
     /// [`TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES`](wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES),
     /// and the adapter given, the adapter's own formats can be stored to.
     ///

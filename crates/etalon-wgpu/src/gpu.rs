@@ -136,6 +136,11 @@ impl Gpu {
             && self.features.contains(wgpu::Features::PASSTHROUGH_SHADERS)
     }
 
+    /// Whether kernels may have `f16`, in buffers too.
+    pub(crate) fn computes_f16(&self) -> bool {
+        self.features.contains(wgpu::Features::SHADER_F16)
+    }
+
     /// Whether the device's own clock tells the time around any command.
     pub(crate) fn tells_time(&self) -> bool {
         let queries =

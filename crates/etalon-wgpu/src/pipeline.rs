@@ -4,7 +4,7 @@ use std::num::NonZeroU64;
 
 use etalon_core::backend::BackendError;
 use etalon_core::format::SampleKind;
-use etalon_core::kernel::{Binding, BindingKind, Kernel};
+use etalon_core::kernel::{Binding, BindingKind, Kernel, Need};
 
 use crate::convert;
 use crate::fault::unsupported;
@@ -27,6 +27,7 @@ pub(crate) fn uniform_bytes(size: u32) -> u64 {
 impl Pipeline {
     /// Translates a kernel, which `step` needs.
     pub(crate) fn new(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<Self, BackendError> {
+        check_needs(gpu, kernel, step)?;
         check_workgroup(gpu, kernel, step)?;
         let entries = kernel
             .bindings
@@ -89,6 +90,27 @@ fn translated(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleEr
             })
     })
     .map_err(ModuleError::Fault)
+}
+
+/// The device has to have what the kernel needs beyond WebGPU's core.
+fn check_needs(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), BackendError> {
+    for need in &kernel.needs {
+        let (feature, enabled) = match need {
+            // wgpu's feature is arithmetic and buffers in one.
+            Need::F16 | Need::F16Buffer { .. } => ("SHADER_F16", gpu.computes_f16()),
+            // A need that this backend does not know.
+            _ => ("none", false),
+        };
+        if !enabled {
+            return Err(BackendError::Lacking {
+                step: step.to_owned(),
+                kernel: kernel.name.clone(),
+                need: need.clone(),
+                feature,
+            });
+        }
+    }
+    Ok(())
 }
 
 /// wgpu checks this only for modules that it translates itself.

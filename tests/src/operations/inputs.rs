@@ -140,9 +140,15 @@ pub fn any(ty: FloatType, random: &mut Random) -> u32 {
     }
 }
 
-/// A number whose magnitude lies within 2^±8.
+/// A number whose magnitude lies within 2^±8, in `f16` within 2^±2, so that
+/// products of several are numbers too.
 pub fn ordinary(ty: FloatType, random: &mut Random) -> u32 {
-    let magnitude = power_of_two((random.bits() % 16) as i32 - 8) * (1.0 + random.unit());
+    let range = match ty {
+        FloatType::F32 => 8,
+        FloatType::F16 => 2,
+    };
+    let exponent = (random.bits() % (2 * range)) as i32 - range as i32;
+    let magnitude = power_of_two(exponent) * (1.0 + random.unit());
     let sign = if random.bits() & 1 == 0 { 1.0 } else { -1.0 };
     ty.encode(ty.below(super::exact::Exact::new(sign * magnitude)))
 }
@@ -162,6 +168,10 @@ pub fn one(ty: FloatType, range: (f64, f64), seed: u64) -> Vec<Vec<u32>> {
     all.extend(powers(ty));
     all.extend((0..2000).map(|_| any(ty, &mut random)));
     all.extend((0..2000).map(|_| between(ty, range.0, range.1, &mut random)));
+    if ty == FloatType::F16 {
+        // There are few enough to have a good part of them all.
+        all.extend((0..=0xffff).step_by(5));
+    }
     all.into_iter().map(|word| vec![word]).collect()
 }
 

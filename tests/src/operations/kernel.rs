@@ -4,6 +4,10 @@
 //! words to `result`: of each scalar of the results one run of all cases, for
 //! componentwise operations first computed by scalars and then by vectors of
 //! four. Cases are padded to a multiple of four by repeating the last.
+//!
+//! An `f16` lies in the lower half of its word. It is loaded and stored as what
+//! it is, since anything else would be one more operation: from `halves`, which
+//! is bound to the same bytes as `data`, and to a `result` of `f16`s.
 
 use std::fmt::Write;
 
@@ -54,39 +58,63 @@ pub fn workgroups(operation: &Operation) -> u32 {
     (invocations as u32).div_ceil(64)
 }
 
-/// A scalar from a word.
-fn load(scalar: Scalar, word: &str) -> String {
+/// The scalar that the word `at` holds.
+fn load(scalar: Scalar, at: &str) -> String {
     match scalar {
-        Scalar::F32 | Scalar::I32 => format!("bitcast<{}>({word})", scalar.name()),
-        Scalar::F16 => format!("bitcast<vec2<f16>>({word}).x"),
-        Scalar::U32 => word.to_owned(),
-        Scalar::Bool => format!("({word} != 0u)"),
+        Scalar::F32 | Scalar::I32 => format!("bitcast<{}>(data[{at}])", scalar.name()),
+        Scalar::F16 => format!("halves[2u * ({at})]"),
+        Scalar::U32 => format!("data[{at}]"),
+        Scalar::Bool => format!("(data[{at}] != 0u)"),
     }
 }
 
-/// A word from a scalar.
-fn store(scalar: Scalar, value: &str) -> String {
+/// The statement that stores a scalar as the word `at`.
+fn store(scalar: Scalar, at: &str, value: &str) -> String {
     match scalar {
-        Scalar::F32 | Scalar::I32 => format!("bitcast<u32>({value})"),
-        Scalar::F16 => format!("(bitcast<u32>(vec2<f16>({value}, f16(0))) & 0xffffu)"),
-        Scalar::U32 => value.to_owned(),
-        Scalar::Bool => format!("select(0u, 1u, {value})"),
+        Scalar::F32 | Scalar::I32 => format!("result[{at}] = bitcast<u32>({value});"),
+        Scalar::F16 => format!("result[2u * ({at})] = {value};"),
+        Scalar::U32 => format!("result[{at}] = {value};"),
+        Scalar::Bool => format!("result[{at}] = select(0u, 1u, {value});"),
     }
+}
+
+/// Whether the kernel has the binding `data`, and whether it has `halves`.
+#[must_use]
+pub fn reads(operation: &Operation) -> [bool; 2] {
+    let is_half = |scalar| scalar == Scalar::F16;
+    [
+        operation.input_scalars().any(|scalar| !is_half(scalar)),
+        operation.input_scalars().any(is_half),
+    ]
+}
+
+/// Whether results are `f16`s. An operation's results are all so, or none is.
+#[must_use]
+pub fn gives_halves(operation: &Operation) -> bool {
+    operation
+        .output_scalars()
+        .any(|scalar| scalar == Scalar::F16)
 }
 
 /// The kernel's WGSL.
 #[must_use]
 pub fn wgsl(operation: &Operation) -> String {
-    let uses_f16 = operation
-        .input_scalars()
-        .chain(operation.output_scalars())
-        .any(|scalar| scalar == Scalar::F16);
+    let ([words, halves], gives_halves) = (reads(operation), gives_halves(operation));
     let mut text = String::new();
-    if uses_f16 {
+    if halves || gives_halves {
         text += "enable f16;\n";
     }
-    text += "@group(0) @binding(0) var<storage, read> data: array<u32>;\n\
-             @group(0) @binding(1) var<storage, read_write> result: array<u32>;\n";
+    if words {
+        text += "@group(0) @binding(0) var<storage, read> data: array<u32>;\n";
+    }
+    if halves {
+        text += "@group(0) @binding(2) var<storage, read> halves: array<f16>;\n";
+    }
+    let result = if gives_halves { "f16" } else { "u32" };
+    let _ = writeln!(
+        text,
+        "@group(0) @binding(1) var<storage, read_write> result: array<{result}>;"
+    );
     match operation.form {
         Form::Componentwise => componentwise(&mut text, operation),
         Form::Whole => whole(&mut text, operation),
@@ -136,8 +164,8 @@ fn componentwise(text: &mut String, operation: &Operation) {
     let _ = writeln!(text, "if id.x >= {}u {{ return; }}", padded(operation) / 4);
     for (index, ((_, scalar), name)) in operation.parameters.iter().zip(NAMES).enumerate() {
         for lane in 0..4 {
-            let word = format!("data[(4u * id.x + {lane}u) * {width}u + {index}u]");
-            let _ = writeln!(text, "let {name}{lane} = {};", load(*scalar, &word));
+            let at = format!("(4u * id.x + {lane}u) * {width}u + {index}u");
+            let _ = writeln!(text, "let {name}{lane} = {};", load(*scalar, &at));
         }
         let _ = writeln!(
             text,
@@ -158,11 +186,8 @@ fn componentwise(text: &mut String, operation: &Operation) {
             let scalar = format!("one_{index}({})", arguments(&lane.to_string()));
             for (form, value) in [scalar, format!("v{index}[{lane}]")].iter().enumerate() {
                 let at = position(operation, form, index, lane);
-                let _ = writeln!(
-                    text,
-                    "result[{at}u + 4u * id.x] = {};",
-                    store(output.scalar, value)
-                );
+                let at = format!("{at}u + 4u * id.x");
+                let _ = writeln!(text, "{}", store(output.scalar, &at, value));
             }
         }
     }
@@ -176,7 +201,7 @@ fn whole(text: &mut String, operation: &Operation) {
     let mut next = 0;
     for (&(shape, scalar), name) in operation.parameters.iter().zip(NAMES) {
         let parts: Vec<String> = (0..shape.count())
-            .map(|part| load(scalar, &format!("data[id.x * {width}u + {}u]", next + part)))
+            .map(|part| load(scalar, &format!("id.x * {width}u + {}u", next + part)))
             .collect();
         next += shape.count();
         let value = match shape {
@@ -196,12 +221,8 @@ fn whole(text: &mut String, operation: &Operation) {
                 Shape::Vector(_) => format!("r{index}[{part}]"),
                 Shape::Matrix(_, rows) => format!("r{index}[{}][{}]", part / rows, part % rows),
             };
-            let at = position(operation, 0, next + part, 0);
-            let _ = writeln!(
-                text,
-                "result[{at}u + id.x] = {};",
-                store(output.scalar, &value)
-            );
+            let at = format!("{}u + id.x", position(operation, 0, next + part, 0));
+            let _ = writeln!(text, "{}", store(output.scalar, &at, &value));
         }
         next += output.shape.count();
     }

@@ -1,5 +1,6 @@
 //! Judgements as a table, and what follows from them.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use super::exceptions::Exception;
@@ -29,6 +30,9 @@ pub struct Report {
     pub problems: Vec<String>,
     /// Failures that are exceptions.
     pub excused: Vec<String>,
+    /// What devices lack, and how many kernels were not run for that reason,
+    /// which is no failure: by executor and feature.
+    pub lacking: BTreeMap<(String, String), usize>,
 }
 
 impl Report {
@@ -36,6 +40,13 @@ impl Report {
     #[must_use]
     pub fn ok(&self) -> bool {
         self.problems.is_empty()
+    }
+
+    /// Takes note that an executor could not run an operation because its
+    /// device lacks a feature.
+    pub fn lacks(&mut self, executor: &str, feature: &str) {
+        let key = (executor.to_owned(), feature.to_owned());
+        *self.lacking.entry(key).or_default() += 1;
     }
 
     /// Weighs the entries' failures against the exceptions. Exceptions of
@@ -123,6 +134,12 @@ impl Report {
                 .map(|entry| entry.judgement.results)
                 .sum::<usize>(),
         );
+        for ((executor, feature), count) in &self.lacking {
+            let _ = writeln!(
+                text,
+                "{executor} lacks `{feature}`: {count} kernels were not run on it."
+            );
+        }
         if !self.excused.is_empty() {
             let _ = writeln!(text, "\nExceptions");
             for excused in &self.excused {
@@ -326,6 +343,22 @@ mod tests {
             2,
             "the failure, and the exception that is stale"
         );
+    }
+
+    #[test]
+    fn what_a_device_lacks_is_said_and_no_failure() {
+        let mut report = report(vec![entry("a + b, f16", "cpu", None)]);
+        report.executors.push("ash/old".to_owned());
+        report.lacks("ash/old", "shaderFloat16");
+        report.lacks("ash/old", "shaderFloat16");
+        report.conclude(&[]);
+        assert!(report.ok());
+        let table = report.table(&[]);
+        assert!(
+            table.contains("ash/old lacks `shaderFloat16`: 2 kernels were not run on it."),
+            "{table}"
+        );
+        assert!(table.contains("–"), "{table}");
     }
 
     #[test]

@@ -23,6 +23,18 @@ pub enum RunError {
     Results,
 }
 
+impl RunError {
+    /// The feature that the executor's device lacks and the kernel needs, if
+    /// that is the reason.
+    #[must_use]
+    pub const fn lacking(&self) -> Option<&'static str> {
+        match self {
+            Self::Backend(BackendError::Lacking { feature, .. }) => Some(*feature),
+            _ => None,
+        }
+    }
+}
+
 impl std::fmt::Display for RunError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -80,9 +92,13 @@ pub fn run(
             bytes: 4 * words as u64,
         },
     );
-    let written = graph
-        .compute(path(index))
-        .read_buffer("data", input)
+    let mut pass = graph.compute(path(index));
+    for (name, is_read) in ["data", "halves"].into_iter().zip(kernel::reads(operation)) {
+        if is_read {
+            pass = pass.read_buffer(name, input);
+        }
+    }
+    let written = pass
         .write_buffer("result", result)
         .groups([kernel::workgroups(operation), 1, 1])
         .and_then(|written| written.buffer("result"))
@@ -101,10 +117,18 @@ pub fn run(
         .next()
         .map(|captured| captured.data)
     {
-        Some(CapturedData::Buffer(bytes)) if bytes.len() == 4 * words => Ok(bytes
-            .chunks_exact(4)
-            .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
-            .collect()),
+        Some(CapturedData::Buffer(bytes)) if bytes.len() == 4 * words => {
+            // The upper halves are nobody's.
+            let mask = if kernel::gives_halves(operation) {
+                0xffff
+            } else {
+                u32::MAX
+            };
+            Ok(bytes
+                .chunks_exact(4)
+                .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]) & mask)
+                .collect())
+        }
         _ => Err(RunError::Results),
     }
 }

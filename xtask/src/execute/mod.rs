@@ -237,9 +237,9 @@ pub fn run(job: &Job) -> Result<(), OutcomeError> {
                 ExecuteError::Backend(BackendError::NoDevice { .. }) => {
                     Outcome::NoDevice { reason }
                 }
-                ExecuteError::Backend(BackendError::Unsupported { .. }) => {
-                    Outcome::Unsupported { reason }
-                }
+                ExecuteError::Backend(
+                    BackendError::Unsupported { .. } | BackendError::Lacking { .. },
+                ) => Outcome::Unsupported { reason },
                 _ => Outcome::Failed { reason },
             }
         }

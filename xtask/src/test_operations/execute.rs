@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use etalon_core::backend::BackendError;
 use etalon_core::kernel::Arithmetic;
 use etalon_tests::operations::operation::Operation;
-use etalon_tests::operations::run::{executor_name, library, run};
+use etalon_tests::operations::run::{RunError, executor_name, library, run};
 use etalon_tests::operations::table;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -102,6 +102,8 @@ pub(super) struct OperationRun {
     pub(super) strict: bool,
     /// The file with the words of the results, or why there is none.
     pub(super) results: Result<String, String>,
+    /// The feature that the device lacks, where that is why.
+    pub(super) lacking: Option<String>,
 }
 
 /// Why results cannot be written or read.
@@ -190,6 +192,7 @@ pub fn execute(job: &Job) -> Result<(), ResultsError> {
                         continue;
                     }
                     let results = run(backend.as_mut(), &kernels, &operations, index, arithmetic);
+                    let lacking = results.as_ref().err().and_then(RunError::lacking);
                     let results = match results {
                         Ok(words) => Ok(save(&job.out, runs.len(), &words)?),
                         Err(error) => Err(error.to_string()),
@@ -198,6 +201,7 @@ pub fn execute(job: &Job) -> Result<(), ResultsError> {
                         operation: operation.name.clone(),
                         strict,
                         results,
+                        lacking: lacking.map(str::to_owned),
                     });
                 }
             }
@@ -237,6 +241,7 @@ mod tests {
             operation: "a + b, f32".into(),
             strict: true,
             results,
+            lacking: None,
         };
         let words = [0, 1, 0x8000_0000, u32::MAX];
         let file = save(folder.path(), 7, &words).unwrap();

@@ -223,7 +223,12 @@ impl Bench {
             let mut interpreter: Option<Vec<u32>> = None;
             for finished in &self.finished {
                 let key = (operation.name.clone(), strict);
-                let results = match finished.runs.get(&key) {
+                let run = finished.runs.get(&key);
+                if let Some(feature) = run.and_then(|run| run.lacking.as_deref()) {
+                    self.report.lacks(&finished.name, feature);
+                    continue;
+                }
+                let results = match run {
                     Some(run) => run.read(&finished.folder),
                     None => Err("was not run".to_owned()),
                 };
@@ -293,6 +298,13 @@ fn as_json(report: &Report) -> Value {
         "executors": report.executors,
         "problems": report.problems,
         "exceptions": report.excused,
+        "lacking": report
+            .lacking
+            .iter()
+            .map(|((executor, feature), count)| {
+                json!({ "executor": executor, "feature": feature, "operations": count })
+            })
+            .collect::<Vec<_>>(),
         "entries": entries,
     })
 }

@@ -10,15 +10,18 @@ use super::assemble::{self, Assembly, Names};
 use super::error::KernelError;
 use super::library::Sources;
 use super::source_map::{Misprint, SourceMap};
-use super::{Arithmetic, Kernel, KernelId, KernelRequest, lint, reflect, scan, specialise};
+use super::{
+    Arithmetic, Kernel, KernelId, KernelRequest, half, lint, need, reflect, scan, specialise,
+};
 
 /// The name every kernel's entry point has.
 const ENTRY_POINT: &str = "main";
 
 /// What WGSL may use beyond its core: see the documentation of
 /// [`kernel`](super).
-pub(super) const CAPABILITIES: Capabilities =
-    Capabilities::CUBE_ARRAY_TEXTURES.union(Capabilities::SHADER_FLOAT16_IN_FLOAT32);
+pub(super) const CAPABILITIES: Capabilities = Capabilities::CUBE_ARRAY_TEXTURES
+    .union(Capabilities::SHADER_FLOAT16)
+    .union(Capabilities::SHADER_FLOAT16_IN_FLOAT32);
 
 /// A request in the one form that equal requests share.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -101,6 +104,7 @@ pub(super) fn compile(
         let parsed = parse(&wgsl, &origin)?;
         check_entry_point(&parsed, &origin)?;
         reflect::check_places(&parsed, &origin)?;
+        half::check(&parsed, &origin)?;
         let info = validate(&parsed, &origin)?;
         let (mut module, constants) = specialise::specialise(&parsed, &info, &origin)?;
         naga::compact::compact(&mut module, naga::compact::KeepUnused::No);
@@ -133,6 +137,7 @@ pub(super) fn compile(
             constants,
             entry_point: entry_point.name.clone(),
             workgroup_size: entry_point.workgroup_size,
+            needs: need::needs(&module, &info, &bindings),
             bindings,
             unused,
             wgsl,

@@ -16,10 +16,16 @@
 //!
 //! # What a kernel may use
 //!
-//! WGSL as every WebGPU device has it, and cube array textures. Extensions
-//! that some devices lack (`f16`, subgroups, 16-bit normalised storage
-//! textures, `f64`, …) are refused, since a kernel has to run on all of them;
-//! so is everything that depends on how invocations are laid out in hardware.
+//! WGSL as every WebGPU device has it, cube array textures, and `f16` in
+//! kernels that say `enable f16;`. What of that some devices lack is in
+//! [`Kernel::needs`], and a backend whose device lacks it says so. Other
+//! extensions (subgroups, 16-bit normalised storage textures, `f64`, …) are
+//! refused, since a kernel has to run on all devices; so is everything that
+//! depends on how invocations are laid out in hardware.
+//!
+//! `f16` is for values, variables, workgroup memory and storage buffers, not for
+//! uniforms. naga cannot cast bits between it and 32 bits, nor give the exponent
+//! of its `frexp`; both are refused with what to write instead.
 //!
 //! Every resource is in group 0 with an explicit `@binding`; names are what
 //! passes refer to. There is at most one `var<uniform>`, a structure of
@@ -41,8 +47,10 @@ mod check;
 mod compile;
 mod error;
 mod files;
+mod half;
 mod library;
 pub mod lint;
+mod need;
 mod reflect;
 mod scan;
 mod similar;
@@ -66,6 +74,7 @@ pub use binding::{
 pub use error::{Diagnostic, KernelError};
 pub use files::{GENERATED, SourceLocation};
 pub use library::{KernelLibrary, KernelStats};
+pub use need::Need;
 pub use source_map::SourceMap;
 #[cfg(feature = "spirv")]
 pub use spirv::{NO_CONTRACTION_OPCODES, SpirvOptions, spirv};
@@ -174,6 +183,8 @@ pub struct Kernel {
     pub workgroup_size: [u32; 3],
     /// The resources it uses, in order of binding number.
     pub bindings: Vec<Binding>,
+    /// What it needs that not every device has.
+    pub needs: Vec<Need>,
     /// Names of resources that its file declares but that this variant does
     /// not use, sorted. They need not be bound; that they are given is no
     /// mistake.

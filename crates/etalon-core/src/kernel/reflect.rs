@@ -281,6 +281,9 @@ impl Reflection<'_> {
                 scalar: uniform_scalar(scalar)?,
                 size: size as u32,
             }),
+            TypeInner::Matrix { scalar, .. } if scalar != Scalar::F32 => {
+                Err("a matrix of something other than f32".to_owned())
+            }
             TypeInner::Matrix { columns, rows, .. } => Ok(UniformType::Matrix {
                 columns: columns as u32,
                 rows: rows as u32,

@@ -4,7 +4,7 @@ use naga::back::spv;
 use naga::proc::{BoundsCheckPolicies, BoundsCheckPolicy};
 
 use super::error::KernelError;
-use super::{Arithmetic, Kernel};
+use super::{Arithmetic, Kernel, Need};
 
 /// How a kernel is translated to SPIR-V.
 ///
@@ -53,8 +53,9 @@ const VERSION: (u8, u8) = (1, 3);
 /// What a module may ask of a device: Vulkan's core, read-only and write-only
 /// storage in the formats beyond WebGPU's (`shaderStorageImageExtendedFormats`)
 /// and cube arrays (`imageCubeArray`). naga spells out what else it would use
-/// shortcuts for.
-const CAPABILITIES: [spv::Capability; 7] = [
+/// shortcuts for. Kernels that need `f16` ask for `shaderFloat16`, and for
+/// `storageBuffer16BitAccess` where a buffer holds any.
+const CAPABILITIES: [spv::Capability; 8] = [
     spv::Capability::Shader,
     spv::Capability::Matrix,
     spv::Capability::ImageQuery,
@@ -63,6 +64,7 @@ const CAPABILITIES: [spv::Capability; 7] = [
     spv::Capability::StorageImageWriteWithoutFormat,
     spv::Capability::SampledCubeArray,
     spv::Capability::ImageCubeArray,
+    spv::Capability::Float16,
 ];
 
 /// The floating-point instructions that drivers may contract, which SPIR-V
@@ -114,6 +116,8 @@ pub fn spirv(kernel: &Kernel, options: &SpirvOptions) -> Result<Vec<u32>, Kernel
         zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::Polyfill,
         force_loop_bounding: options.bounded_loops,
         emit_int_div_checks: true,
+        // Compute shaders have no inputs and outputs of `f16`.
+        use_storage_input_output_16: false,
         debug_info: None,
         ..spv::Options::default()
     };
@@ -123,6 +127,7 @@ pub fn spirv(kernel: &Kernel, options: &SpirvOptions) -> Result<Vec<u32>, Kernel
     };
     let mut words = spv::write_vec(&kernel.module, &kernel.info, &writer, Some(&pipeline))
         .map_err(|error| fail(error.to_string()))?;
+    drop_unused_access(&mut words, kernel).map_err(|reason| fail(reason.to_owned()))?;
     if kernel.arithmetic == Arithmetic::Strict {
         forbid_contraction(&mut words).map_err(|reason| fail(reason.to_owned()))?;
     }
@@ -131,6 +136,9 @@ pub fn spirv(kernel: &Kernel, options: &SpirvOptions) -> Result<Vec<u32>, Kernel
 
 /// Words before the first instruction (SPIR-V §2.3).
 const HEADER: usize = 5;
+const OP_CAPABILITY: u16 = 17;
+const STORAGE_BUFFER_16_BIT_ACCESS: u32 = 4433;
+const UNIFORM_AND_STORAGE_BUFFER_16_BIT_ACCESS: u32 = 4434;
 const OP_DECORATE: u32 = 71;
 const DECORATION_NO_CONTRACTION: u32 = 42;
 
@@ -154,6 +162,32 @@ fn instructions(words: &[u32]) -> impl Iterator<Item = Result<(usize, u16, usize
         at += count;
         Some(Ok((start, opcode, count)))
     })
+}
+
+/// Takes back the capabilities that naga declares for every module with `f16`
+/// and that this one makes no use of: access to uniform buffers, which hold
+/// none, and to storage buffers, if none does.
+fn drop_unused_access(words: &mut Vec<u32>, kernel: &Kernel) -> Result<(), &'static str> {
+    let in_buffers = kernel
+        .needs
+        .iter()
+        .any(|need| matches!(need, Need::F16Buffer { .. }));
+    let mut unused = Vec::new();
+    for instruction in instructions(words) {
+        let (at, opcode, count) = instruction?;
+        if opcode != OP_CAPABILITY {
+            break;
+        }
+        match words.get(at + 1) {
+            Some(&UNIFORM_AND_STORAGE_BUFFER_16_BIT_ACCESS) => unused.push(at..at + count),
+            Some(&STORAGE_BUFFER_16_BIT_ACCESS) if !in_buffers => unused.push(at..at + count),
+            _ => {}
+        }
+    }
+    for range in unused.into_iter().rev() {
+        words.drain(range);
+    }
+    Ok(())
 }
 
 /// Decorates the result of every contractible instruction.

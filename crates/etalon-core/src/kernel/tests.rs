@@ -2,6 +2,7 @@
 
 mod compile;
 mod embedded;
+mod half;
 mod interface;
 mod places;
 mod refusals;

@@ -5,7 +5,7 @@ use naga::{
     UnaryOperator,
 };
 
-use super::layout::{class_of, describe, is_half};
+use super::layout::{describe, is_half, is_short};
 use super::{Fail, Frame, Operand, Place, Translator};
 use crate::ir::{Arith, Class, Op, Value};
 
@@ -215,8 +215,14 @@ impl<'a> Translator<'a> {
             }
             Expression::ImageSample { .. } => self.image_sample(frame, expression)?,
             Expression::ImageQuery { image, query } => self.image_query(frame, image, query)?,
-            Expression::Unary { op, expr } => self.unary(frame, op, expr)?,
+            Expression::Unary { op, expr } => {
+                self.refuse_short(frame, expr)?;
+                self.unary(frame, op, expr)?
+            }
             Expression::Binary { op, left, right } => {
+                if !is_comparison(op) {
+                    self.refuse_short(frame, left)?;
+                }
                 self.rounded_as(frame, left, |this, frame| {
                     this.binary(frame, op, left, right)
                 })?
@@ -246,9 +252,12 @@ impl<'a> Translator<'a> {
                 arg1,
                 arg2,
                 arg3,
-            } => self.rounded_as(frame, arg, |this, frame| {
-                this.math(frame, fun, &[Some(arg), arg1, arg2, arg3])
-            })?,
+            } => {
+                self.refuse_short(frame, arg)?;
+                self.rounded_as(frame, arg, |this, frame| {
+                    this.math(frame, fun, &[Some(arg), arg1, arg2, arg3])
+                })?
+            }
             Expression::As {
                 expr,
                 kind,
@@ -291,6 +300,19 @@ impl<'a> Translator<'a> {
         result
     }
 
+    /// Integers of 16 bits come from `frexp` and bit casts of `f16`; WGSL has no
+    /// arithmetic on them.
+    pub(super) fn refuse_short(
+        &self,
+        frame: &Frame<'a>,
+        operand: Handle<Expression>,
+    ) -> Result<(), Fail> {
+        if self.ty(frame, operand).scalar().is_some_and(is_short) {
+            return Err(Fail::unsupported("arithmetic on 16-bit integers"));
+        }
+        Ok(())
+    }
+
     fn literal(&mut self, literal: Literal) -> Result<Value, Fail> {
         Ok(match literal {
             Literal::F32(value) => self.builder.float(value),
@@ -298,9 +320,8 @@ impl<'a> Translator<'a> {
             Literal::I32(value) => self.builder.int(value as u32),
             Literal::Bool(value) => self.builder.bool(value),
             Literal::F16(value) => self.builder.float(value.to_f32()),
-            Literal::I16(_) | Literal::U16(_) => {
-                return Err(Fail::unsupported("16-bit integer scalars"));
-            }
+            Literal::I16(value) => self.builder.int(i32::from(value) as u32),
+            Literal::U16(value) => self.builder.int(value.into()),
             Literal::F64(_) | Literal::U64(_) | Literal::I64(_) => {
                 return Err(Fail::unsupported("64-bit scalars"));
             }
@@ -620,85 +641,14 @@ impl<'a> Translator<'a> {
                 .collect()),
         }
     }
+}
 
-    fn cast(
-        &mut self,
-        frame: &mut Frame<'a>,
-        expression: Handle<Expression>,
-        to: ScalarKind,
-        convert: Option<u8>,
-    ) -> Result<Vec<Value>, Fail> {
-        let from = self.kind(frame, expression)?;
-        let from_half = self.ty(frame, expression).scalar().is_some_and(is_half);
-        let values = self.scalars(frame, expression)?;
-        let to_half = match (to, convert) {
-            (ScalarKind::Bool, _) | (_, Some(4)) => false,
-            (ScalarKind::Float, Some(2)) => true,
-            (_, None) if from_half => return Err(Fail::unsupported("bitcasts of f16")),
-            (_, None) => false,
-            (_, Some(width)) => {
-                return Err(Fail::unsupported(format!(
-                    "{}-bit scalars",
-                    u32::from(width) * 8
-                )));
-            }
-        };
-        if convert.is_some() {
-            self.check_conversion(&values, from, to);
-        }
-        Ok(values
-            .into_iter()
-            .map(|value| {
-                let value = self.cast_scalar(value, from, to, convert.is_some());
-                // Integers whose binary32 is rounded are beyond binary16.
-                if to_half && !from_half && from != ScalarKind::Bool {
-                    self.builder.arith(Arith::RoundHalf, &[value])
-                } else {
-                    value
-                }
-            })
-            .collect())
-    }
-
-    fn cast_scalar(
-        &mut self,
-        value: Value,
-        from: ScalarKind,
-        to: ScalarKind,
-        convert: bool,
-    ) -> Value {
-        use ScalarKind as K;
-        if !convert {
-            return match (class_of(from), class_of(to)) {
-                (Class::Float, Class::Int) => self.builder.arith(Arith::FToBits, &[value]),
-                (Class::Int, Class::Float) => self.builder.arith(Arith::BitsToF, &[value]),
-                _ => value,
-            };
-        }
-        match (from, to) {
-            (K::Float, K::Sint) => self.builder.arith(Arith::FToS, &[value]),
-            (K::Float, K::Uint) => self.builder.arith(Arith::FToU, &[value]),
-            (K::Sint, K::Float) => self.builder.arith(Arith::SToF, &[value]),
-            (K::Uint, K::Float) => self.builder.arith(Arith::UToF, &[value]),
-            (K::Bool, K::Float) => {
-                let (one, zero) = (self.builder.float(1.0), self.builder.float(0.0));
-                self.builder.select(value, one, zero)
-            }
-            (K::Bool, K::Sint | K::Uint) => {
-                let one = self.builder.int(1);
-                self.builder.arith(Arith::And, &[value, one])
-            }
-            (K::Float, K::Bool) => {
-                let zero = self.builder.float(0.0);
-                self.builder.arith(Arith::NeF, &[value, zero])
-            }
-            (K::Sint | K::Uint, K::Bool) => {
-                let zero = self.builder.int(0);
-                self.builder.arith(Arith::NeI, &[value, zero])
-            }
-            _ => value,
-        }
-    }
+fn is_comparison(op: BinaryOperator) -> bool {
+    use BinaryOperator as B;
+    matches!(
+        op,
+        B::Equal | B::NotEqual | B::Less | B::LessEqual | B::Greater | B::GreaterEqual
+    )
 }
 
 fn slice(values: &[Value], start: usize, count: usize) -> Result<Vec<Value>, Fail> {

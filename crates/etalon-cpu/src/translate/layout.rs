@@ -11,6 +11,8 @@ pub(super) struct Leaf {
     pub(super) kind: ScalarKind,
     /// Whether it is an `f16`.
     pub(super) is_half: bool,
+    /// Whether it is an integer of 16 bits.
+    pub(super) is_short: bool,
     /// Where it lies in host-shareable memory, in bytes from the start of the type.
     pub(super) offset: u32,
 }
@@ -53,6 +55,7 @@ impl<'a> Translator<'a> {
             TypeInner::Scalar(scalar) | TypeInner::Atomic(scalar) => out.push(Leaf {
                 kind: supported(scalar)?,
                 is_half: is_half(scalar),
+                is_short: is_short(scalar),
                 offset,
             }),
             TypeInner::Vector { size, scalar } => {
@@ -60,6 +63,7 @@ impl<'a> Translator<'a> {
                 out.extend((0..size as u32).map(|i| Leaf {
                     kind,
                     is_half: is_half(scalar),
+                    is_short: is_short(scalar),
                     offset: offset.saturating_add(bytes(scalar) * i),
                 }));
             }
@@ -74,6 +78,7 @@ impl<'a> Translator<'a> {
                     out.extend((0..rows as u32).map(|row| Leaf {
                         kind,
                         is_half: is_half(scalar),
+                        is_short: is_short(scalar),
                         offset: start.saturating_add(bytes(scalar) * row),
                     }));
                 }
@@ -126,11 +131,18 @@ impl<'a> Translator<'a> {
 
 /// Bytes of a scalar in memory that the host sees.
 pub(super) fn bytes(scalar: naga::Scalar) -> u32 {
-    if is_half(scalar) { 2 } else { 4 }
+    if scalar.width == 2 { 2 } else { 4 }
 }
 
 pub(super) fn is_half(scalar: naga::Scalar) -> bool {
     scalar == naga::Scalar::F16
+}
+
+/// Whether a scalar is an integer of 16 bits. WGSL has none, but naga makes the
+/// exponent of an `f16`'s `frexp` one, and a bit cast of `f16` gives one. They
+/// are kept in 32 bits, extended by their sign if they have one.
+pub(super) fn is_short(scalar: naga::Scalar) -> bool {
+    matches!(scalar, naga::Scalar::I16 | naga::Scalar::U16)
 }
 
 /// Bytes from one column of a matrix to the next: columns are aligned as
@@ -153,7 +165,7 @@ fn supported(scalar: naga::Scalar) -> Result<ScalarKind, Fail> {
     match (scalar.kind, scalar.width) {
         (ScalarKind::Bool, _)
         | (ScalarKind::Float, 2 | 4)
-        | (ScalarKind::Sint | ScalarKind::Uint, 4) => Ok(scalar.kind),
+        | (ScalarKind::Sint | ScalarKind::Uint, 2 | 4) => Ok(scalar.kind),
         (kind, width) => Err(Fail::unsupported(format!(
             "{}-bit {} scalars",
             u32::from(width) * 8,

@@ -3,6 +3,7 @@
 
 mod builder;
 mod check;
+mod convert;
 mod expression;
 mod image;
 mod layout;

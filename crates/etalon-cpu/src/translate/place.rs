@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use naga::TypeInner;
 
-use super::layout::{bytes, column_stride, fixed_length};
+use super::layout::{Leaf, bytes, column_stride, fixed_length};
 use super::{Fail, Translator};
 use crate::ir::{Access, Arith, AtomicFunction, Class, Memory, Op, Slots, Value, Variable};
 
@@ -305,6 +305,7 @@ impl<'a> Translator<'a> {
     pub(super) fn load(&mut self, place: &Place) -> Result<Vec<Value>, Fail> {
         self.check_memory(place, Access::Read)?;
         let leaves = self.leaves(&place.ty)?;
+        refuse_shorts(place, &leaves)?;
         let mut slots = Slots::default();
         let mut values = Vec::with_capacity(leaves.len());
         for (i, leaf) in leaves.into_iter().enumerate() {
@@ -379,6 +380,7 @@ impl<'a> Translator<'a> {
         if leaves.len() != values.len() {
             return Err(Fail::invalid("a stored value is not of the pointer's type"));
         }
+        refuse_shorts(place, &leaves)?;
         self.check_memory(place, Access::Write)?;
         let mut slots = Slots::default();
         for (i, (leaf, &value)) in leaves.into_iter().zip(values).enumerate() {
@@ -491,6 +493,16 @@ impl<'a> Translator<'a> {
         };
         let operands: Vec<Value> = values.iter().copied().chain(index).collect();
         Ok(self.builder.op(op, &operands, &[Class::Int])[0])
+    }
+}
+
+/// Buffers of integers of 16 bits are no part of WGSL.
+fn refuse_shorts(place: &Place, leaves: &[Leaf]) -> Result<(), Fail> {
+    match place.root {
+        Root::Buffer { .. } if leaves.iter().any(|leaf| leaf.is_short) => {
+            Err(Fail::unsupported("16-bit integers in buffers"))
+        }
+        _ => Ok(()),
     }
 }
 

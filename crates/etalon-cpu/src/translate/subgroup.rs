@@ -108,6 +108,7 @@ impl<'a> Translator<'a> {
     ) -> Result<(), Fail> {
         use ScalarKind as K;
         use SubgroupOperation as S;
+        self.refuse_short(frame, argument)?;
         let kind = self.kind(frame, argument)?;
         let combine = match (op, kind) {
             // Booleans are all zeros or all ones.

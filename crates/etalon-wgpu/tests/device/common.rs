@@ -7,7 +7,7 @@ use etalon_core::graph::Graph;
 use etalon_core::image::ImageData;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanOptions};
-use etalon_core::resource::TextureDesc;
+use etalon_core::resource::{BufferDesc, TextureDesc};
 use etalon_wgpu::{WgpuBackend, WgpuOptions, wgpu};
 
 /// A way from a plan to a device.
@@ -213,4 +213,32 @@ pub(crate) fn uints(image: &ImageData) -> Vec<u32> {
 /// The texels of an image of one 32-bit float channel.
 pub(crate) fn floats(image: &ImageData) -> Vec<f32> {
     uints(image).into_iter().map(f32::from_bits).collect()
+}
+
+/// A kernel with `f16`, in a buffer too, and a graph that runs it: 6 and 1.5 as
+/// `f16`s.
+pub(crate) fn half_floats() -> (KernelLibrary, Graph) {
+    let library = library(
+        "test/half",
+        "enable f16;
+         @group(0) @binding(0) var<storage, read_write> halves: array<f16>;
+         @compute @workgroup_size(1)
+         fn main(@builtin(global_invocation_id) id: vec3u) {
+             let two = f16(id.x) + 2.0h;
+             halves[0] = two * 3.0h;
+             halves[1] = 3.0h / two;
+         }",
+    );
+    let mut graph = Graph::new();
+    let halves = graph.buffer("halves", BufferDesc { bytes: 4 });
+    let halves = graph
+        .compute("test/half")
+        .write_buffer("halves", halves)
+        .groups([1, 1, 1])
+        .and_then(|written| written.buffer("halves"))
+        .expect("one buffer is written");
+    graph
+        .output_buffer("halves", halves)
+        .expect("there is no other output");
+    (library, graph)
 }

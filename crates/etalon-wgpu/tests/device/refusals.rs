@@ -1,11 +1,11 @@
 //! What cannot be run, and how that is said.
 
-use crate::common::{Route, library, on_vulkan, open, plan, run, words};
+use crate::common::{Route, everywhere, half_floats, library, on_vulkan, open, plan, run, words};
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError, Inputs};
 use etalon_core::graph::{ClearValue, Graph};
 use etalon_core::image::ImageData;
-use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::kernel::{Arithmetic, KernelLibrary, Need};
 use etalon_core::plan::{Capture, Plan, PlanOptions, Step};
 use etalon_core::resource::{BufferDesc, Extent, Limits, TextureDesc};
 use etalon_wgpu::{WgpuBackend, WgpuOptions, enumerate, wgpu};
@@ -240,6 +240,28 @@ fn dispatch(workgroup: &str, memory: u32, groups: [u32; 3]) -> (KernelLibrary, G
         .unwrap();
     graph.output_buffer("seen", seen).unwrap();
     (library, graph)
+}
+
+#[test]
+fn half_floats_run_or_are_refused_by_name() {
+    everywhere(|route, backend| {
+        let (library, graph) = half_floats();
+        let plan = plan(backend, &graph, &library, Capture::Outputs);
+        match backend.execute(&plan, &Inputs::new()) {
+            Ok(execution) => assert_eq!(words(&execution, "halves"), [0x3e00_4600]),
+            Err(BackendError::Lacking {
+                step,
+                kernel,
+                need,
+                feature,
+            }) => {
+                assert_eq!((step.as_str(), kernel.as_str()), ("test/half", "test/half"));
+                assert_eq!((need, feature), (Need::F16, "SHADER_F16"));
+                println!("{route:?} has no f16");
+            }
+            Err(error) => panic!("{route:?}: {error}"),
+        }
+    });
 }
 
 #[test]

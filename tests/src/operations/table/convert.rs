@@ -10,7 +10,9 @@ const F32: FloatType = FloatType::F32;
 
 /// Adds all of them.
 pub(super) fn add(all: &mut Vec<Operation>) {
-    from_floats(all);
+    from_floats(all, F32);
+    from_floats(all, FloatType::F16);
+    between_floats(all);
     from_integers(all);
     bits(all);
     half(all);
@@ -26,10 +28,11 @@ fn truncated(x: f64, low: f64, high: f64) -> f64 {
     }
 }
 
-fn from_floats(all: &mut Vec<Operation>) {
+fn from_floats(all: &mut Vec<Operation>, ty: FloatType) {
+    let s = Scalar::from(ty);
     let to_integer = |low: f64, high: f64| {
         words(move |x| {
-            let value = F32.decode(x[0]);
+            let value = ty.decode(x[0]);
             let own = truncated(value, low, high) as i64 as u32;
             if value.is_finite() {
                 Words::exactly(own)
@@ -39,27 +42,27 @@ fn from_floats(all: &mut Vec<Operation>) {
         })
     };
     let accuracy = "§15.7.6: truncated, then the nearest value that both types have";
+    let (low, high, unsigned_high) = match ty {
+        FloatType::F32 => (-2_147_483_648.0, 2_147_483_520.0, 4_294_967_040.0),
+        FloatType::F16 => (-ty.largest(), ty.largest(), ty.largest()),
+    };
     for (code, scalar, meaning) in [
-        (
-            "$i32(a)",
-            Scalar::I32,
-            to_integer(-2_147_483_648.0, 2_147_483_520.0),
-        ),
-        ("$u32(a)", Scalar::U32, to_integer(0.0, 4_294_967_040.0)),
+        ("$i32(a)", Scalar::I32, to_integer(low, high)),
+        ("$u32(a)", Scalar::U32, to_integer(0.0, unsigned_high)),
     ] {
         all.push(
             componentwise(
-                format!("{}(a), f32", scalar.name()),
+                format!("{}(a), {}", scalar.name(), s.name()),
                 accuracy,
-                &[Scalar::F32],
+                &[s],
                 vec![(code, scalar, meaning)],
-                inputs::one(F32, (-4e9, 8e9), 61),
+                inputs::one(ty, (-4e9, 8e9), 61),
             )
             .strict(),
         );
     }
-    let to_bool = words(|x| {
-        let value = F32.decode(x[0]);
+    let to_bool = words(move |x| {
+        let value = ty.decode(x[0]);
         let own = u32::from(value != 0.0);
         if value.is_finite() {
             Words::exactly(own)
@@ -69,31 +72,59 @@ fn from_floats(all: &mut Vec<Operation>) {
     });
     all.push(
         componentwise(
-            "bool(a), f32",
+            format!("bool(a), {}", s.name()),
             "§17.1.2.3: false for zero",
-            &[Scalar::F32],
+            &[s],
             vec![("$bool(a)", Scalar::Bool, to_bool)],
-            inputs::one(F32, (-1.0, 1.0), 62),
+            inputs::one(ty, (-1.0, 1.0), 62),
+        )
+        .strict(),
+    );
+}
+
+/// Between the two floating-point types.
+fn between_floats(all: &mut Vec<Operation>) {
+    use Scalar::{F16, F32 as Float};
+    let accuracy = "§15.7.6: exact or one of the neighbours; what is out of range is open";
+    all.push(
+        componentwise(
+            "f16(a), f32",
+            accuracy,
+            &[Float],
+            vec![("$f16(a)", F16, rounded(FloatType::F16, |x| x[0], |x| x[0]))],
+            around_halves(69),
+        )
+        .strict(),
+    );
+    all.push(
+        componentwise(
+            "f32(a), f16",
+            accuracy,
+            &[F16],
+            vec![("$f32(a)", Float, rounded(F32, |x| x[0], |x| x[0]))],
+            (0..=0xffff).map(|half| vec![half]).collect(),
         )
         .strict(),
     );
 }
 
 fn from_integers(all: &mut Vec<Operation>) {
-    use Scalar::{Bool, F32 as Float, I32, U32};
-    let number = || rounded(F32, |x: &[Exact]| x[0], |x: &[f32]| x[0]);
-    let accuracy = "§15.7.6: exact or one of the neighbours";
+    use Scalar::{Bool, F16, F32 as Float, I32, U32};
+    let accuracy = "§15.7.6: exact or one of the neighbours; what is out of range is open";
     for from in [I32, U32] {
-        all.push(
-            componentwise(
-                format!("f32(a), {}", from.name()),
-                accuracy,
-                &[from],
-                vec![("$f32(a)", Float, number())],
-                inputs::integer_cases(1, 63),
-            )
-            .strict(),
-        );
+        for (to, code, ty) in [(Float, "$f32(a)", F32), (F16, "$f16(a)", FloatType::F16)] {
+            let number = rounded(ty, |x: &[Exact]| x[0], |x: &[f32]| x[0]);
+            all.push(
+                componentwise(
+                    format!("{}(a), {}", to.name(), from.name()),
+                    accuracy,
+                    &[from],
+                    vec![(code, to, number)],
+                    inputs::integer_cases(1, 63),
+                )
+                .strict(),
+            );
+        }
         all.push(
             componentwise(
                 format!("bool(a), {}", from.name()),
@@ -121,6 +152,7 @@ fn from_integers(all: &mut Vec<Operation>) {
     let booleans: Vec<Vec<u32>> = (0..256_u32).map(|i| vec![((i * 37) >> 3) & 1]).collect();
     for (to, code, one) in [
         (Float, "$f32(a)", 1.0_f32.to_bits()),
+        (F16, "$f16(a)", 0x3c00),
         (I32, "$i32(a)", 1),
         (U32, "$u32(a)", 1),
     ] {
@@ -215,6 +247,20 @@ pub(super) fn halves(value: f64) -> Vec<f64> {
     all
 }
 
+/// Cases of an `f32` that becomes an `f16`: every exponent of those, and around
+/// the middle between neighbours.
+fn around_halves(seed: u64) -> Vec<Vec<u32>> {
+    let f16 = FloatType::F16;
+    let mut cases = inputs::one(F32, (-2.0, 2.0), 68);
+    let mut random = inputs::Random::new(seed);
+    for _ in 0..3000 {
+        let low = f16.decode(random.word() & 0x7bff);
+        let middle = F32.encode(low + f16.ulp(low) * 0.5);
+        cases.push(vec![(middle + random.word() % 3).wrapping_sub(1)]);
+    }
+    cases
+}
+
 fn half(all: &mut Vec<Operation>) {
     let f16 = FloatType::F16;
     let quantized = words(move |x| {
@@ -237,19 +283,11 @@ fn half(all: &mut Vec<Operation>) {
             Words::open(own)
         }
     });
-    let mut cases = inputs::one(F32, (-2.0, 2.0), 68);
-    // Every binary16 exponent, and around the middle between neighbours.
-    let mut random = inputs::Random::new(69);
-    for _ in 0..3000 {
-        let low = f16.decode(random.word() & 0x7bff);
-        let middle = F32.encode(low + f16.ulp(low) * 0.5);
-        cases.push(vec![(middle + random.word() % 3).wrapping_sub(1)]);
-    }
     all.push(componentwise(
         "quantizeToF16(a), f32",
         "§15.7.4.1: correctly rounded; subnormal f16 may be flushed, out of range is open",
         &[Scalar::F32],
         vec![("quantizeToF16(a)", Scalar::F32, quantized)],
-        cases,
+        around_halves(69),
     ));
 }

@@ -16,14 +16,16 @@ use super::float::FloatType;
 use super::interval::Interval;
 use super::operation::{Float, Form, Meaning, Operation, Output, Rule, Scalar, Shape, Words, rule};
 
-/// Every operation on 32-bit numbers and booleans.
+/// Every operation on numbers and booleans.
 #[must_use]
 pub fn all() -> Vec<Operation> {
     let mut all = Vec::new();
-    float::add(&mut all, FloatType::F32);
-    elementary::add(&mut all, FloatType::F32);
-    vector::add(&mut all, FloatType::F32);
-    matrix::add(&mut all, FloatType::F32);
+    for ty in [FloatType::F32, FloatType::F16] {
+        float::add(&mut all, ty);
+        elementary::add(&mut all, ty);
+        vector::add(&mut all, ty);
+        matrix::add(&mut all, ty);
+    }
     convert::add(&mut all);
     packing::add(&mut all);
     integer::add(&mut all);
@@ -198,6 +200,15 @@ mod tests {
             assert!(operation.cases.len() >= 100, "{}", operation.name);
             assert!(
                 operation.cases.iter().all(|case| case.len() == width),
+                "{}",
+                operation.name
+            );
+            let halves = operation
+                .output_scalars()
+                .filter(|&scalar| scalar == Scalar::F16)
+                .count();
+            assert!(
+                [0, operation.output_scalars().count()].contains(&halves),
                 "{}",
                 operation.name
             );

@@ -181,8 +181,8 @@ fn bad_text_is_an_error_with_its_place() {
             "redefinition of `main`",
         ),
         (
-            "enable f16;\n@compute @workgroup_size(1) fn main() { let x = 1.0h; }",
-            "1:8",
+            "@compute @workgroup_size(1) fn main() { let x = 1.0h; }",
+            "1:49",
             "f16",
         ),
     ] {

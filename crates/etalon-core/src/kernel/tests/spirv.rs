@@ -66,6 +66,57 @@ fn validate(words: &[u32]) -> Option<Result<(), String>> {
     })
 }
 
+/// The capabilities that a module declares.
+fn capabilities(words: &[u32]) -> Vec<u32> {
+    let all = instructions(words).into_iter();
+    all.filter(|(opcode, _)| *opcode == 17)
+        .map(|(_, words)| words[1])
+        .collect()
+}
+
+#[test]
+fn half_floats_are_not_contracted_and_ask_for_no_more_than_they_need() {
+    let (float16, storage, uniform, input) = (9, 4433, 4434, 4436);
+    let text = |buffer: &str| {
+        format!(
+            "enable f16;
+             @group(0) @binding(0) var<storage, read_write> data: array<{buffer}>;
+             var<workgroup> kept: array<f16, 4>;
+             @compute @workgroup_size(1) fn main() {{
+                 kept[0] = f16(data[0]);
+                 workgroupBarrier();
+                 let h = kept[0];
+                 let v = vec4(h, 1.0h, f16(data[1]), h);
+                 let w = v * v + v - v * h / v;
+                 data[2] = {buffer}(-w.x * w.y + w.z - h * 2.0h / w.w);
+             }}"
+        )
+    };
+    for (buffer, in_buffers) in [("f16", true), ("f32", false)] {
+        let kernel = compile_one(&text(buffer), Arithmetic::Strict).unwrap();
+        let words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+        let mut expected = contractible(&words);
+        let mut found = decorated(&words);
+        assert!(expected.len() >= 11, "{expected:?}");
+        expected.sort_unstable();
+        found.sort_unstable();
+        assert_eq!(found, expected);
+        let asked = capabilities(&words);
+        assert!(asked.contains(&float16), "{asked:?}");
+        assert_eq!(asked.contains(&storage), in_buffers, "{asked:?}");
+        assert!(
+            !asked.contains(&uniform) && !asked.contains(&input),
+            "{asked:?}"
+        );
+        if let Some(result) = validate(&words) {
+            result.unwrap_or_else(|message| panic!("{message}"));
+        }
+    }
+    let plain = compile_one(&evaluating("x * x"), Arithmetic::Strict).unwrap();
+    let words = spirv(&plain, &SpirvOptions::default()).unwrap();
+    assert!(!capabilities(&words).contains(&float16));
+}
+
 #[test]
 fn contraction_is_forbidden_in_strict_kernels_only() {
     let text = evaluating("-x + x - x * x / v.x + (v * x).z + (m * x)[0].y");

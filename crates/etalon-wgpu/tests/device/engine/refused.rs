@@ -1,10 +1,10 @@
 //! What an engine hands over that a plan cannot use.
 
 use super::{Engine, OUTPUT, ROW, add, adder, row};
-use crate::common::{image, plan};
+use crate::common::{half_floats, image, plan};
 use etalon_core::backend::{Backend, BackendError};
 use etalon_core::graph::Graph;
-use etalon_core::kernel::KernelLibrary;
+use etalon_core::kernel::{KernelLibrary, Need};
 use etalon_core::plan::{Capture, Plan};
 use etalon_core::resource::BufferDesc;
 use etalon_wgpu::{WgpuBindings, wgpu};
@@ -170,6 +170,35 @@ fn what_does_not_fit_is_refused_with_what_would() {
     let bindings = WgpuBindings::new().texture("row", &foreign);
     let error = backend.record(&mut encoder, &plan, &bindings).unwrap_err();
     assert!(matches!(error, BackendError::Api { .. }), "{error}");
+}
+
+#[test]
+fn half_floats_are_refused_where_the_engine_has_not_enabled_them() {
+    let Some(engine) = Engine::new() else { return };
+    let mut backend = engine.backend();
+    let (library, graph) = half_floats();
+    let plan = plan(&backend, &graph, &library, Capture::None);
+    let mut encoder = engine.encoder();
+    let error = backend
+        .record(&mut encoder, &plan, &WgpuBindings::new())
+        .unwrap_err();
+    let BackendError::Lacking {
+        kernel,
+        need,
+        feature,
+        ..
+    } = &error
+    else {
+        panic!("{error}");
+    };
+    assert_eq!(
+        (kernel.as_str(), need, *feature),
+        ("test/half", &Need::F16, "SHADER_F16")
+    );
+    assert!(
+        error.to_string().contains("`test/half` needs `f16`"),
+        "{error}"
+    );
 }
 
 #[test]

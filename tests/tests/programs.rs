@@ -296,7 +296,12 @@ fn spirv_of(trial: &Trial) -> Vec<u8> {
     kernels.add_source("program", &trial.wgsl);
     let request = KernelRequest::new("program");
     let kernel = kernels.get(&request, Arithmetic::Strict).unwrap();
-    let words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+    let words = spirv(
+        &kernel,
+        naga::ShaderStage::Compute,
+        &SpirvOptions::default(),
+    )
+    .unwrap();
     words.iter().flat_map(|word| word.to_le_bytes()).collect()
 }
 

@@ -177,6 +177,10 @@ impl Checker<'_> {
                 self.bindings(step, &kernel.0, bindings)?;
                 self.groups(step, groups)
             }
+            Step::Raster(_) => Err(BackendError::Unsupported {
+                step: step.name.clone(),
+                what: "draws".to_owned(),
+            }),
             Step::ClearTexture {
                 resource, range, ..
             } => {

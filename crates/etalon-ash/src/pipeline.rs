@@ -119,7 +119,10 @@ fn over_limit(limits: &vk::PhysicalDeviceLimits, kernel: &Kernel) -> Option<Stri
             .count();
         u64::try_from(count).unwrap_or(u64::MAX)
     };
-    let [x, y, z] = kernel.workgroup_size.map(u64::from);
+    let [x, y, z] = kernel
+        .compute()
+        .map_or([1; 3], |stage| stage.workgroup_size)
+        .map(u64::from);
     let invocations = x.saturating_mul(y).saturating_mul(z);
     let max = limits.max_compute_work_group_size;
     let textures = of(|kind| matches!(kind, BindingKind::Texture { .. }));
@@ -211,10 +214,13 @@ impl Pipeline {
         step: &PlannedStep,
     ) -> Result<Arc<Self>, BackendError> {
         check(device, kernel, &step.name)?;
-        let words = spirv(kernel, &spirv_options()).map_err(|error| BackendError::Kernel {
-            step: step.name.clone(),
-            error: Box::new(error),
-        })?;
+        let words =
+            spirv(kernel, naga::ShaderStage::Compute, &spirv_options()).map_err(|error| {
+                BackendError::Kernel {
+                    step: step.name.clone(),
+                    error: Box::new(error),
+                }
+            })?;
         let words = crate::chains::flatten(&words);
         count(&device.tally.kernels, 1);
         let entries: Vec<_> = kernel
@@ -260,7 +266,8 @@ impl Pipeline {
         // no capability beyond those `check` has found enabled.
         let module = unsafe { raw.create_shader_module(&info, None) }
             .map_err(failed("vkCreateShaderModule"))?;
-        let name: Vec<u8> = kernel.entry_point.bytes().chain([0]).collect();
+        let entry_point = kernel.compute().map_or("main", |stage| &stage.entry_point);
+        let name: Vec<u8> = entry_point.bytes().chain([0]).collect();
         let result = match std::ffi::CStr::from_bytes_with_nul(&name) {
             Ok(name) => {
                 let stage = vk::PipelineShaderStageCreateInfo::default()
@@ -277,7 +284,7 @@ impl Pipeline {
             }
             Err(_) => Err(BackendError::Api {
                 call: "vkCreateComputePipelines",
-                reason: format!("entry point {:?} has a NUL in it", kernel.entry_point),
+                reason: format!("entry point {entry_point:?} has a NUL in it"),
             }),
         };
         // SAFETY: a pipeline does not need its module once it is made.

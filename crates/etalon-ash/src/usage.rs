@@ -49,6 +49,22 @@ pub(crate) fn row(usage: Usage) -> Row {
             L::TRANSFER_DST_OPTIMAL,
         ),
         Usage::Indirect => (S::DRAW_INDIRECT, A::INDIRECT_COMMAND_READ, L::GENERAL),
+        Usage::ColourTarget => (
+            S::COLOR_ATTACHMENT_OUTPUT,
+            A::COLOR_ATTACHMENT_READ | A::COLOR_ATTACHMENT_WRITE,
+            L::COLOR_ATTACHMENT_OPTIMAL,
+        ),
+        Usage::DepthTarget => (
+            S::EARLY_FRAGMENT_TESTS | S::LATE_FRAGMENT_TESTS,
+            A::DEPTH_STENCIL_ATTACHMENT_READ | A::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            L::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
+        ),
+        Usage::Vertices => (
+            S::VERTEX_ATTRIBUTE_INPUT,
+            A::VERTEX_ATTRIBUTE_READ,
+            L::GENERAL,
+        ),
+        Usage::Indices => (S::INDEX_INPUT, A::INDEX_READ, L::GENERAL),
     };
     Row {
         stages,
@@ -65,7 +81,10 @@ pub(crate) fn source(from: UsageSet) -> (vk::PipelineStageFlags2, vk::AccessFlag
             vk::AccessFlags2::MEMORY_WRITE,
         );
     }
-    let writes = vk::AccessFlags2::SHADER_STORAGE_WRITE | vk::AccessFlags2::TRANSFER_WRITE;
+    let writes = vk::AccessFlags2::SHADER_STORAGE_WRITE
+        | vk::AccessFlags2::TRANSFER_WRITE
+        | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE
+        | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE;
     from.iter().map(row).fold(
         (vk::PipelineStageFlags2::empty(), vk::AccessFlags2::empty()),
         |(stages, access), row| (stages | row.stages, access | (row.access & writes)),
@@ -83,7 +102,9 @@ pub(crate) fn image_flags(usages: UsageSet) -> vk::ImageUsageFlags {
             }
             Usage::CopySource => vk::ImageUsageFlags::TRANSFER_SRC,
             Usage::CopyTarget => vk::ImageUsageFlags::TRANSFER_DST,
-            Usage::Indirect => vk::ImageUsageFlags::empty(),
+            Usage::ColourTarget => vk::ImageUsageFlags::COLOR_ATTACHMENT,
+            Usage::DepthTarget => vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT,
+            Usage::Indirect | Usage::Vertices | Usage::Indices => vk::ImageUsageFlags::empty(),
         })
         .fold(vk::ImageUsageFlags::empty(), |all, flags| all | flags)
 }
@@ -99,6 +120,9 @@ pub(crate) fn buffer_flags(usages: UsageSet) -> vk::BufferUsageFlags {
             Usage::CopySource => vk::BufferUsageFlags::TRANSFER_SRC,
             Usage::CopyTarget => vk::BufferUsageFlags::TRANSFER_DST,
             Usage::Indirect => vk::BufferUsageFlags::INDIRECT_BUFFER,
+            Usage::Vertices => vk::BufferUsageFlags::VERTEX_BUFFER,
+            Usage::Indices => vk::BufferUsageFlags::INDEX_BUFFER,
+            Usage::ColourTarget | Usage::DepthTarget => vk::BufferUsageFlags::empty(),
         })
         .fold(vk::BufferUsageFlags::empty(), |all, flags| all | flags)
 }
@@ -107,7 +131,7 @@ pub(crate) fn buffer_flags(usages: UsageSet) -> vk::BufferUsageFlags {
 mod tests {
     use super::*;
 
-    const ALL: [Usage; 7] = [
+    const ALL: [Usage; 11] = [
         Usage::Sampled,
         Usage::StorageRead,
         Usage::StorageWrite,
@@ -115,13 +139,18 @@ mod tests {
         Usage::CopySource,
         Usage::CopyTarget,
         Usage::Indirect,
+        Usage::ColourTarget,
+        Usage::DepthTarget,
+        Usage::Vertices,
+        Usage::Indices,
     ];
 
     #[test]
     fn what_a_plan_takes_for_one_layout_is_one_layout() {
         for a in ALL {
             for b in ALL {
-                if a != Usage::Indirect && b != Usage::Indirect {
+                let of_buffers = [Usage::Indirect, Usage::Vertices, Usage::Indices];
+                if !of_buffers.contains(&a) && !of_buffers.contains(&b) {
                     assert_eq!(
                         a.same_layout(b),
                         row(a).layout == row(b).layout,

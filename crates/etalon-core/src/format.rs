@@ -210,6 +210,27 @@ impl Format {
         }
     }
 
+    /// Whether every device can draw to the format: to colour formats as colour
+    /// targets, to depth formats as depth targets.
+    #[must_use]
+    pub const fn renderable(self) -> bool {
+        !matches!(
+            self,
+            Self::R8Snorm
+                | Self::Rg8Snorm
+                | Self::Rgba8Snorm
+                | Self::Rgb9e5Ufloat
+                | Self::Rg11b10Ufloat
+        )
+    }
+
+    /// Whether every device can blend what is drawn to the format with what is
+    /// there.
+    #[must_use]
+    pub const fn blendable(self) -> bool {
+        self.renderable() && matches!(self.sample_kind(), SampleKind::Float) && self.filterable()
+    }
+
     /// The format with the given WebGPU name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {

@@ -158,7 +158,9 @@ impl Program {
             Box::new(locate),
             &kernel.module,
             &kernel.info,
-            &kernel.entry_point,
+            kernel
+                .compute()
+                .map_or("main", |stage| stage.entry_point.as_str()),
             options,
         )
     }

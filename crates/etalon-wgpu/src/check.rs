@@ -220,6 +220,7 @@ impl Checker<'_> {
                 }
                 self.groups(groups)
             }
+            Step::Raster(_) => Err(self.unsupported("draws")),
             Step::ClearTexture {
                 resource, range, ..
             } => {

@@ -87,7 +87,8 @@ pub(crate) fn texture_usages(usages: UsageSet, format: Format) -> wgpu::TextureU
                 T::COPY_DST | T::RENDER_ATTACHMENT
             }
             Usage::CopyTarget => T::COPY_DST,
-            Usage::Indirect => T::empty(),
+            Usage::ColourTarget | Usage::DepthTarget => T::RENDER_ATTACHMENT,
+            Usage::Indirect | Usage::Vertices | Usage::Indices => T::empty(),
         }
     })
 }
@@ -103,6 +104,9 @@ pub(crate) fn buffer_usages(usages: UsageSet) -> wgpu::BufferUsages {
             Usage::CopySource => B::COPY_SRC,
             Usage::CopyTarget => B::COPY_DST,
             Usage::Indirect => B::INDIRECT,
+            Usage::Vertices => B::VERTEX,
+            Usage::Indices => B::INDEX,
+            Usage::ColourTarget | Usage::DepthTarget => B::empty(),
         }
     })
 }

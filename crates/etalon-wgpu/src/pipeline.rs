@@ -68,7 +68,7 @@ impl Pipeline {
                         label: Some(&kernel.name),
                         layout: Some(&pipeline_layout),
                         module: &module,
-                        entry_point: Some(&kernel.entry_point),
+                        entry_point: kernel.compute().map(|stage| stage.entry_point.as_str()),
                         compilation_options: wgpu::PipelineCompilationOptions::default(),
                         cache: None,
                     });
@@ -116,7 +116,9 @@ fn check_needs(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), BackendErro
 /// wgpu checks this only for modules that it translates itself.
 fn check_workgroup(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), BackendError> {
     let limits = gpu.raw_limits();
-    let [x, y, z] = kernel.workgroup_size;
+    let [x, y, z] = kernel
+        .compute()
+        .map_or([1; 3], |stage| stage.workgroup_size);
     let invocations = u64::from(x)
         .saturating_mul(y.into())
         .saturating_mul(z.into());

@@ -152,9 +152,11 @@ impl Prepared {
                     )?),
                     None => PreparedStep::Plain,
                 },
-                Step::ClearBuffer { .. } | Step::CopyTexture { .. } | Step::CopyBuffer { .. } => {
-                    PreparedStep::Plain
-                }
+                // Refused by the check.
+                Step::Raster(_)
+                | Step::ClearBuffer { .. }
+                | Step::CopyTexture { .. }
+                | Step::CopyBuffer { .. } => PreparedStep::Plain,
             });
         }
         let uniforms = if plan.uniforms.is_empty() {

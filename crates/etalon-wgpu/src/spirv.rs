@@ -16,14 +16,17 @@ pub(crate) enum ModuleError {
 /// The shader module of a kernel, from the words that every Vulkan executor of
 /// Etalon runs.
 pub(crate) fn module(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleError> {
-    let mut words = spirv(kernel, &SpirvOptions::default())
+    let mut words = spirv(kernel, naga::ShaderStage::Compute, &SpirvOptions::default())
         .map_err(|error| ModuleError::Kernel(Box::new(error)))?;
     pack_bindings(&mut words, &kernel.bindings);
-    let [x, y, z] = kernel.workgroup_size;
+    let (name, [x, y, z]) = match kernel.compute() {
+        Some(stage) => (stage.entry_point.as_str(), stage.workgroup_size),
+        None => ("main", [1; 3]),
+    };
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
         label: Some(&kernel.name),
         entry_points: vec![wgpu::PassthroughShaderEntryPoint {
-            name: kernel.entry_point.as_str().into(),
+            name: name.into(),
             workgroup_size: (x, y, z),
         }]
         .into(),
@@ -103,7 +106,12 @@ mod tests {
         let kernel = library
             .get(&KernelRequest::new("test/gaps"), Arithmetic::Strict)
             .unwrap();
-        let mut words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+        let mut words = spirv(
+            &kernel,
+            naga::ShaderStage::Compute,
+            &SpirvOptions::default(),
+        )
+        .unwrap();
         assert_eq!(decorated(&words), [2, 5, 7]);
         let before = words.clone();
         pack_bindings(&mut words, &kernel.bindings);

@@ -116,6 +116,14 @@ pub enum GraphError {
         /// Format and size of the target.
         target_shape: String,
     },
+    /// Targets or draws that cannot be.
+    #[error("raster pass `{pass}`: {error}")]
+    Raster {
+        /// The pass.
+        pass: String,
+        /// What is wrong and what would be right.
+        error: String,
+    },
     /// A clear with a value of the wrong kind.
     #[error("pass `{pass}` clears a {format} texture with {value}")]
     ClearMismatch {

@@ -33,6 +33,7 @@
 mod error;
 mod handle;
 mod pass;
+mod raster;
 mod uniform;
 
 use std::borrow::Cow;
@@ -47,6 +48,8 @@ pub(crate) use handle::GraphId;
 pub use handle::{Buffer, Subresources, Texture, TextureView};
 pub(crate) use pass::{Access, AccessKind, Dispatch, Pass, Work};
 pub use pass::{ComputePass, Written};
+pub(crate) use raster::{DeclaredDraw, Extent, RasterWork, Slice};
+pub use raster::{Draw, Load, RasterPass};
 pub use uniform::UniformValue;
 
 use crate::format::SampleKind;
@@ -380,6 +383,38 @@ impl Graph {
         ComputePass::new(self, path.into())
     }
 
+    /// Declares a raster pass: draws into colour and depth targets.
+    ///
+    /// ```
+    /// use etalon_core::Format;
+    /// use etalon_core::graph::{Buffer, ClearValue, Draw, Graph, GraphError, Load, Texture};
+    /// use etalon_core::raster::{DepthState, RasterState, VertexFormat, VertexLayout};
+    /// use etalon_core::resource::TextureDesc;
+    ///
+    /// fn silhouette(graph: &mut Graph, positions: Buffer) -> Result<Texture, GraphError> {
+    ///     let colour = graph.texture("colour", TextureDesc::d2(640, 360, Format::Rgba8Unorm));
+    ///     let depth = graph.texture("depth", TextureDesc::d2(640, 360, Format::Depth32Float));
+    ///     let draw = Draw::new("example/silhouette")
+    ///         .vertices(positions, 0, VertexLayout::packed("position", VertexFormat::Float32x3))
+    ///         .elements(0..36)
+    ///         .state(RasterState {
+    ///             depth: Some(DepthState::REVERSED),
+    ///             ..RasterState::default()
+    ///         })
+    ///         .set("tint", glam::Vec4::new(1.0, 0.5, 0.0, 1.0));
+    ///     graph
+    ///         .raster("silhouette")
+    ///         .colour("colour", colour, Load::Clear(ClearValue::Float([0.0; 4])))
+    ///         .depth(depth, Load::Clear(ClearValue::Float([0.0; 4])))
+    ///         .draw(draw)
+    ///         .finish()?
+    ///         .texture("colour")
+    /// }
+    /// ```
+    pub fn raster(&mut self, name: impl Into<String>) -> RasterPass<'_> {
+        RasterPass::new(self, name.into())
+    }
+
     /// Fills a texture's mips and layers with one value.
     ///
     /// # Errors
@@ -544,6 +579,7 @@ impl Graph {
         }
         let access = Access {
             binding: Cow::Owned(name.to_owned()),
+            draw: None,
             graph,
             resource,
             version,

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use crate::graph::handle::{Buffer, GraphId, Subresources, Texture, TextureView};
+use crate::graph::raster::RasterWork;
 use crate::graph::{ClearValue, Graph, GraphError, ResourceDesc, UniformValue};
 use crate::kernel::KernelRequest;
 use crate::resource::SamplerDesc;
@@ -16,18 +17,33 @@ pub(crate) enum AccessKind {
     CopySource,
     CopyTarget,
     Indirect,
+    /// A colour or depth target that is cleared.
+    Target,
+    /// One that is drawn over.
+    TargetKept,
+    Vertices,
+    Indices,
 }
 
 impl AccessKind {
     pub(crate) const fn reads(self) -> bool {
         matches!(
             self,
-            Self::Read | Self::Update | Self::CopySource | Self::Indirect
+            Self::Read
+                | Self::Update
+                | Self::CopySource
+                | Self::Indirect
+                | Self::TargetKept
+                | Self::Vertices
+                | Self::Indices
         )
     }
 
     pub(crate) const fn writes(self) -> bool {
-        matches!(self, Self::Write | Self::Update | Self::CopyTarget)
+        matches!(
+            self,
+            Self::Write | Self::Update | Self::CopyTarget | Self::Target | Self::TargetKept
+        )
     }
 }
 
@@ -35,6 +51,8 @@ impl AccessKind {
 #[derive(Clone, Debug)]
 pub(crate) struct Access {
     pub(crate) binding: Cow<'static, str>,
+    /// The draw it is of, in raster passes; targets are of all.
+    pub(crate) draw: Option<u32>,
     pub(crate) graph: GraphId,
     pub(crate) resource: u32,
     /// The version read or written over.
@@ -54,6 +72,7 @@ pub(crate) fn texture(
     let TextureView { texture, range } = view;
     Access {
         binding: binding.into(),
+        draw: None,
         graph: texture.graph,
         resource: texture.resource,
         version: texture.version,
@@ -70,6 +89,7 @@ pub(crate) fn buffer(
 ) -> Access {
     Access {
         binding: binding.into(),
+        draw: None,
         graph: buffer.graph,
         resource: buffer.resource,
         version: buffer.version,
@@ -99,6 +119,7 @@ pub(crate) enum Work {
         uniforms: Vec<(Cow<'static, str>, UniformValue)>,
         samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
     },
+    Raster(RasterWork),
     ClearTexture(ClearValue),
     ClearBuffer,
     CopyTexture,
@@ -241,6 +262,30 @@ pub(crate) fn check(
     Ok(range)
 }
 
+/// The first name that is given twice to a kernel: of a constant, a feature, a
+/// uniform member or a sampler.
+pub(crate) fn repeated(
+    kernel: &KernelRequest,
+    uniforms: &[(Cow<'static, str>, UniformValue)],
+    samplers: &[(Cow<'static, str>, SamplerDesc)],
+) -> Option<String> {
+    fn names<'n, T>(named: &'n [(Cow<'static, str>, T)]) -> Vec<&'n str> {
+        named.iter().map(|(name, _)| name.as_ref()).collect()
+    }
+    [
+        names(uniforms),
+        names(&kernel.constants),
+        names(&kernel.features),
+        names(samplers),
+    ]
+    .into_iter()
+    .find_map(|mut names| {
+        names.sort_unstable();
+        let pair = names.windows(2).find(|pair| pair[0] == pair[1])?;
+        Some(pair[0].to_owned())
+    })
+}
+
 /// Adds a pass: checks every access, then makes the new versions.
 pub(crate) fn declare(
     graph: &mut Graph,
@@ -253,7 +298,7 @@ pub(crate) fn declare(
     }
     for (index, first) in accesses.iter().enumerate() {
         for second in &accesses[index + 1..] {
-            if first.binding == second.binding {
+            if first.binding == second.binding && first.draw == second.draw {
                 return Err(GraphError::GivenTwice {
                     pass: name,
                     name: first.binding.to_string(),
@@ -561,42 +606,11 @@ impl<'g> ComputePass<'g> {
     }
 
     fn dispatch(mut self, dispatch: Dispatch) -> Result<Written, GraphError> {
-        let twice = |names: &mut Vec<&str>| {
-            names.sort_unstable();
-            names
-                .windows(2)
-                .find(|pair| pair[0] == pair[1])
-                .map(|pair| pair[0].to_owned())
-        };
-        let mut members: Vec<&str> = self
-            .uniforms
-            .iter()
-            .map(|(name, _)| name.as_ref())
-            .collect();
-        let mut constants: Vec<&str> = self
-            .kernel
-            .constants
-            .iter()
-            .map(|(name, _)| name.as_ref())
-            .collect();
-        let mut features: Vec<&str> = self
-            .kernel
-            .features
-            .iter()
-            .map(|(name, _)| name.as_ref())
-            .collect();
-        let mut samplers: Vec<&str> = self
-            .samplers
-            .iter()
-            .map(|(name, _)| name.as_ref())
-            .collect();
-        for names in [&mut members, &mut constants, &mut features, &mut samplers] {
-            if let Some(name) = twice(names) {
-                return Err(GraphError::GivenTwice {
-                    pass: self.name,
-                    name,
-                });
-            }
+        if let Some(name) = repeated(&self.kernel, &self.uniforms, &self.samplers) {
+            return Err(GraphError::GivenTwice {
+                pass: self.name,
+                name,
+            });
         }
         // A request's identity must not depend on the order of the calls.
         self.kernel.constants.sort_by(|a, b| a.0.cmp(&b.0));

@@ -4,18 +4,15 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator};
-use naga::{Module, ShaderStage, WithSpan};
+use naga::{Module, WithSpan};
 
 use super::assemble::{self, Assembly, Names};
 use super::error::KernelError;
 use super::library::Sources;
 use super::source_map::{Misprint, SourceMap};
 use super::{
-    Arithmetic, Kernel, KernelId, KernelRequest, half, lint, need, reflect, scan, specialise,
+    Arithmetic, Kernel, KernelId, KernelRequest, half, lint, need, reflect, scan, specialise, stage,
 };
-
-/// The name every kernel's entry point has.
-const ENTRY_POINT: &str = "main";
 
 /// What WGSL may use beyond its core: see the documentation of
 /// [`kernel`](super).
@@ -127,7 +124,7 @@ pub(super) fn compile(
         unused.retain(|name| !bindings.iter().any(|binding| binding.name == *name));
         unused.sort_unstable();
         unused.dedup();
-        let Some(entry_point) = module.entry_points.first() else {
+        let Some(stages) = stage::stages(&module, &origin)? else {
             return Err(no_entry_point(&module, &origin));
         };
         Ok(Kernel {
@@ -135,8 +132,7 @@ pub(super) fn compile(
             name: variant.path.clone(),
             arithmetic: variant.arithmetic,
             constants,
-            entry_point: entry_point.name.clone(),
-            workgroup_size: entry_point.workgroup_size,
+            stages,
             needs: need::needs(&module, &info, &bindings),
             bindings,
             unused,
@@ -209,9 +205,10 @@ pub(super) fn invalid(error: &WithSpan<ValidationError>, origin: &Origin<'_>) ->
 }
 
 fn check_entry_point(module: &Module, origin: &Origin<'_>) -> Result<(), KernelError> {
-    match module.entry_points.as_slice() {
-        [one] if one.stage == ShaderStage::Compute && one.name == ENTRY_POINT => Ok(()),
-        _ => Err(no_entry_point(module, origin)),
+    if stage::are_complete(module) {
+        Ok(())
+    } else {
+        Err(no_entry_point(module, origin))
     }
 }
 

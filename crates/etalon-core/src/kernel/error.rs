@@ -143,9 +143,9 @@ pub enum KernelError {
     /// The text is WESL but not valid WGSL.
     #[error("{0}")]
     Wgsl(Diagnostic),
-    /// There is not exactly one entry point, a compute one called `main`.
+    /// There are not exactly the entry points of a compute or a raster kernel.
     #[error(
-        "kernel `{kernel}` must have exactly one entry point, `@compute fn main`, but has {}",
+        "kernel `{kernel}` must have exactly one entry point, `@compute fn main`, or, to draw, `@vertex fn vertex` and perhaps `@fragment fn fragment`, but has {}",
         none_or(found)
     )]
     EntryPoint {

@@ -96,7 +96,7 @@ struct State {
 /// );
 /// let request = KernelRequest::new("example/halve").constant("factor", 0.25);
 /// let kernel = library.get(&request, Arithmetic::Strict)?;
-/// assert_eq!(kernel.workgroup_size, [64, 1, 1]);
+/// assert_eq!(kernel.compute().unwrap().workgroup_size, [64, 1, 1]);
 /// assert_eq!(kernel.bindings[0].name, "values");
 /// # Ok::<(), etalon_core::kernel::KernelError>(())
 /// ```

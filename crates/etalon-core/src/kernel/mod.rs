@@ -1,6 +1,8 @@
 //! Kernels: WESL text becomes a validated, reflected naga module.
 //!
-//! A kernel is one file with one compute entry point, `main`. It may import
+//! A kernel is one file with one compute entry point, `main`, or with the vertex
+//! entry point `vertex` and mostly the fragment entry point `fragment`; the
+//! latter draws, see [`Graph::raster`](crate::graph::Graph::raster). It may import
 //! from other files, choose between variants with `@if`, and declare
 //! `override` constants; a [`KernelRequest`] names the file and says what the
 //! features and constants are. [`KernelLibrary::get`] does the rest:
@@ -58,6 +60,7 @@ mod source_map;
 mod specialise;
 #[cfg(feature = "spirv")]
 mod spirv;
+mod stage;
 mod syntax;
 #[cfg(test)]
 mod tests;
@@ -78,6 +81,7 @@ pub use need::Need;
 pub use source_map::SourceMap;
 #[cfg(feature = "spirv")]
 pub use spirv::{NO_CONTRACTION_OPCODES, SpirvOptions, spirv};
+pub use stage::{ComputeStage, FragmentStage, RasterStages, StageValue, Stages, VertexStage};
 
 /// Which operations kernels compute with.
 #[derive(
@@ -177,10 +181,8 @@ pub struct Kernel {
     pub module: naga::Module,
     /// What validation found out about the module.
     pub info: naga::valid::ModuleInfo,
-    /// Name of the one entry point, `main`.
-    pub entry_point: String,
-    /// Invocations of a workgroup in x, y and z.
-    pub workgroup_size: [u32; 3],
+    /// Its entry points.
+    pub stages: Stages,
     /// The resources it uses, in order of binding number.
     pub bindings: Vec<Binding>,
     /// What it needs that not every device has.
@@ -211,10 +213,21 @@ impl Kernel {
             })
     }
 
-    /// The entry point function.
+    /// Its compute entry point, if it is a compute kernel.
     #[must_use]
-    pub fn main(&self) -> &naga::Function {
-        // Compiling leaves exactly one.
-        &self.module.entry_points[0].function
+    pub fn compute(&self) -> Option<&ComputeStage> {
+        match &self.stages {
+            Stages::Compute(stage) => Some(stage),
+            Stages::Raster(_) => None,
+        }
+    }
+
+    /// Its vertex and fragment entry points, if it is a raster kernel.
+    #[must_use]
+    pub fn raster(&self) -> Option<&RasterStages> {
+        match &self.stages {
+            Stages::Raster(stages) => Some(stages),
+            Stages::Compute(_) => None,
+        }
     }
 }

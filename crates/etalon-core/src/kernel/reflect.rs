@@ -77,7 +77,9 @@ pub(super) fn bindings(
 ) -> Result<Vec<Binding>, KernelError> {
     let reflection = Reflection {
         module,
-        function: info.get_entry_point(0),
+        functions: (0..module.entry_points.len())
+            .map(|index| info.get_entry_point(index))
+            .collect(),
         origin,
     };
     let mut found: Vec<Binding> = Vec::new();
@@ -131,7 +133,8 @@ impl From<String> for Reason {
 
 struct Reflection<'a> {
     module: &'a Module,
-    function: &'a FunctionInfo,
+    /// The entry points'.
+    functions: Vec<&'a FunctionInfo>,
     origin: &'a Origin<'a>,
 }
 
@@ -220,7 +223,8 @@ impl Reflection<'_> {
             },
         };
         // A comparison sampler filters comparison results, not texels.
-        let filtered = self.function.sampling_set.iter().any(|pair| {
+        let mut pairs = self.functions.iter().flat_map(|f| f.sampling_set.iter());
+        let filtered = pairs.any(|pair| {
             let sampler = self.module.global_variables[pair.sampler].ty;
             pair.image == handle
                 && matches!(

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use naga::back::PipelineConstants;
 use naga::back::pipeline_constants::{PipelineConstantError, process_overrides};
 use naga::valid::ModuleInfo;
-use naga::{Arena, Module, Override, Scalar, ScalarKind, ShaderStage, Span, TypeInner};
+use naga::{Arena, Module, Override, Scalar, ScalarKind, Span, TypeInner};
 
 use super::compile::{Origin, invalid};
 use super::error::KernelError;
@@ -55,8 +55,11 @@ pub(super) fn specialise(
     }
     used.sort_by(|(a, _), (b, _)| a.cmp(b));
 
-    let entry_point = module.entry_points.first();
-    let entry_point = entry_point.map(|entry| (ShaderStage::Compute, entry.name.as_str()));
+    // Of one entry point only what it uses is kept; of several, all.
+    let entry_point = match module.entry_points.as_slice() {
+        [one] => Some((one.stage, one.name.as_str())),
+        _ => None,
+    };
     let (resolved, _) =
         process_overrides(module, info, entry_point, &values).map_err(|error| match error {
             PipelineConstantError::ValidationError(error) => invalid(&error, origin),

@@ -55,8 +55,10 @@ const VERSION: (u8, u8) = (1, 3);
 /// and cube arrays (`imageCubeArray`). naga spells out what else it would use
 /// shortcuts for. Kernels that need `f16` ask for `shaderFloat16`, and for
 /// `storageBuffer16BitAccess` where a buffer holds any.
-const CAPABILITIES: [spv::Capability; 8] = [
+const CAPABILITIES: [spv::Capability; 9] = [
     spv::Capability::Shader,
+    // Coarse and fine derivatives, which all of Vulkan has.
+    spv::Capability::DerivativeControl,
     spv::Capability::Matrix,
     spv::Capability::ImageQuery,
     spv::Capability::StorageImageExtendedFormats,
@@ -75,7 +77,9 @@ pub const NO_CONTRACTION_OPCODES: [u16; 14] = [
     127, 129, 131, 133, 136, 140, 141, 142, 143, 144, 145, 146, 147, 148,
 ];
 
-/// Translates a kernel to SPIR-V with one entry point.
+/// Translates one stage of a kernel to SPIR-V with one entry point.
+///
+/// Positions are as WGSL has them, +Y up: the viewport turns them over.
 ///
 /// Descriptor sets and bindings are WGSL's groups and bindings. Workgroup
 /// memory is zeroed by the shader itself, with a barrier behind it, since
@@ -87,7 +91,11 @@ pub const NO_CONTRACTION_OPCODES: [u16; 14] = [
 /// # Errors
 /// [`KernelError::Spirv`] if the kernel needs what SPIR-V for these devices
 /// does not have.
-pub fn spirv(kernel: &Kernel, options: &SpirvOptions) -> Result<Vec<u32>, KernelError> {
+pub fn spirv(
+    kernel: &Kernel,
+    stage: naga::ShaderStage,
+    options: &SpirvOptions,
+) -> Result<Vec<u32>, KernelError> {
     let fail = |message: String| KernelError::Spirv {
         kernel: kernel.name.clone(),
         message,
@@ -116,14 +124,18 @@ pub fn spirv(kernel: &Kernel, options: &SpirvOptions) -> Result<Vec<u32>, Kernel
         zero_initialize_workgroup_memory: spv::ZeroInitializeWorkgroupMemoryMode::Polyfill,
         force_loop_bounding: options.bounded_loops,
         emit_int_div_checks: true,
-        // Compute shaders have no inputs and outputs of `f16`.
+        // Stages have no inputs and outputs of `f16`.
         use_storage_input_output_16: false,
         debug_info: None,
         ..spv::Options::default()
     };
+    let entries = &kernel.module.entry_points;
+    let entry = entries.iter().find(|entry| entry.stage == stage);
+    let entry =
+        entry.ok_or_else(|| fail(format!("it has no entry point of the stage {stage:?}")))?;
     let pipeline = spv::PipelineOptions {
-        shader_stage: naga::ShaderStage::Compute,
-        entry_point: kernel.entry_point.clone(),
+        shader_stage: stage,
+        entry_point: entry.name.clone(),
     };
     let mut words = spv::write_vec(&kernel.module, &kernel.info, &writer, Some(&pipeline))
         .map_err(|error| fail(error.to_string()))?;

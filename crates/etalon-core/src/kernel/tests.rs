@@ -5,6 +5,7 @@ mod embedded;
 mod half;
 mod interface;
 mod places;
+mod raster;
 mod refusals;
 #[cfg(feature = "spirv")]
 mod spirv;
@@ -26,6 +27,11 @@ fn library(files: &[(&str, &str)]) -> KernelLibrary {
 /// Compiles one file that needs no others.
 fn compile_one(text: &str, arithmetic: Arithmetic) -> Result<Arc<Kernel>, KernelError> {
     library(&[("test/one", text)]).get(&KernelRequest::new("test/one"), arithmetic)
+}
+
+/// The function of the one entry point of a compute kernel.
+fn main(kernel: &Kernel) -> &naga::Function {
+    &kernel.module.entry_points[0].function
 }
 
 /// The error of a file that has one, under fast arithmetic.

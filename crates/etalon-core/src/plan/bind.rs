@@ -9,7 +9,9 @@ use crate::graph::{
 use crate::kernel::{self, BindingKind, Kernel, KernelLibrary, UniformLayout, ViewDimension};
 use crate::plan::cull::Live;
 use crate::plan::error::Mismatch;
-use crate::plan::{Bound, Groups, KernelRef, PlanError, PlanOptions, Step, UniformSlice, Usage};
+use crate::plan::{
+    Bound, Groups, KernelRef, PlanError, PlanOptions, Step, UniformSlice, Usage, raster,
+};
 use crate::resource::{Dimension, SamplerDesc};
 use std::borrow::Cow;
 
@@ -119,12 +121,20 @@ fn bind_pass(
             let binder = Binder {
                 graph,
                 pass,
+                accesses: &pass.accesses,
                 kernel: &kernel,
                 options,
             };
+            let Some(stage) = kernel.compute() else {
+                return Err(binder.differs(
+                    &kernel.name,
+                    "a dispatch",
+                    "a draw: it is a raster kernel",
+                ));
+            };
             let (bindings, uses) = binder.bindings(values, samplers, uniforms)?;
             binder.layouts(&uses)?;
-            let groups = binder.groups(dispatch)?;
+            let groups = binder.groups(dispatch, stage.workgroup_size)?;
             return Ok(BoundPass {
                 step: Step::Dispatch {
                     bindings,
@@ -133,6 +143,9 @@ fn bind_pass(
                 },
                 uses,
             });
+        }
+        Work::Raster(work) => {
+            return raster::bind_raster(graph, pass, work, kernels, options, uniforms);
         }
         Work::ClearTexture(value) => Step::ClearTexture {
             resource: target.0,
@@ -165,12 +178,38 @@ fn bind_pass(
     })
 }
 
-/// Holds one compute pass against its kernel.
-struct Binder<'a> {
-    graph: &'a Graph,
-    pass: &'a Pass,
-    kernel: &'a Kernel,
-    options: &'a PlanOptions<'a>,
+/// A texture of which the same part would have two layouts in one step, and the
+/// usages that ask for them.
+pub(crate) fn layout_conflict<'g>(
+    graph: &'g Graph,
+    uses: &[Use],
+) -> Option<(&'g str, Usage, Usage)> {
+    let textures: Vec<&Use> = uses
+        .iter()
+        .filter(|one| {
+            let resource = &graph.resources[one.resource as usize];
+            matches!(resource.desc, ResourceDesc::Texture(_))
+        })
+        .collect();
+    textures.iter().enumerate().find_map(|(index, first)| {
+        let second = textures[index + 1..].iter().find(|second| {
+            first.resource == second.resource
+                && first.range.overlaps(second.range)
+                && !first.usage.same_layout(second.usage)
+        })?;
+        let name = graph.resources[first.resource as usize].name.as_str();
+        Some((name, first.usage, second.usage))
+    })
+}
+
+/// Holds a compute pass, or one draw of a raster pass, against its kernel.
+pub(crate) struct Binder<'a> {
+    pub(crate) graph: &'a Graph,
+    pub(crate) pass: &'a Pass,
+    /// What is bound: all of the pass, or what the draw has of it.
+    pub(crate) accesses: &'a [Access],
+    pub(crate) kernel: &'a Kernel,
+    pub(crate) options: &'a PlanOptions<'a>,
 }
 
 impl Binder<'_> {
@@ -182,7 +221,7 @@ impl Binder<'_> {
         }
     }
 
-    fn differs(
+    pub(crate) fn differs(
         &self,
         name: &str,
         given: impl Into<String>,
@@ -216,14 +255,14 @@ impl Binder<'_> {
 
     /// Finds what every binding of the kernel is given, and complains about
     /// whatever is given besides.
-    fn bindings(
+    pub(crate) fn bindings(
         &self,
         values: &[(Cow<'static, str>, UniformValue)],
         samplers: &[(Cow<'static, str>, SamplerDesc)],
         uniforms: &mut Vec<u8>,
     ) -> Result<(Vec<Bound>, Vec<Use>), PlanError> {
         let mut bound = Vec::with_capacity(self.kernel.bindings.len());
-        let mut uses = Vec::with_capacity(self.pass.accesses.len());
+        let mut uses = Vec::with_capacity(self.accesses.len());
         let mut block = false;
         for binding in &self.kernel.bindings {
             let name = &binding.name;
@@ -259,11 +298,7 @@ impl Binder<'_> {
                     Bound::Sampler(*sampler)
                 }
                 kind => {
-                    let access = self
-                        .pass
-                        .accesses
-                        .iter()
-                        .find(|access| access.binding == *name);
+                    let access = self.accesses.iter().find(|access| access.binding == *name);
                     let access = access.ok_or_else(|| self.missing("resource", name))?;
                     let resource = &self.graph.resources[access.resource as usize];
                     let usage = self.usage(name, kind, access, resource)?;
@@ -287,7 +322,6 @@ impl Binder<'_> {
         }
         self.nothing_left(values, samplers, block)?;
         for access in self
-            .pass
             .accesses
             .iter()
             .filter(|access| access.kind == AccessKind::Indirect)
@@ -304,26 +338,15 @@ impl Binder<'_> {
 
     /// One texture has one layout at a time, also within a pass.
     fn layouts(&self, uses: &[Use]) -> Result<(), PlanError> {
-        for (index, first) in uses.iter().enumerate() {
-            for second in &uses[index + 1..] {
-                let resource = &self.graph.resources[first.resource as usize];
-                if first.resource == second.resource
-                    && matches!(resource.desc, ResourceDesc::Texture(_))
-                    && first.range.overlaps(second.range)
-                    && !first.usage.same_layout(second.usage)
-                {
-                    let (given, wanted) = (
-                        format!("{:?}", first.usage),
-                        format!("{:?} too", second.usage),
-                    );
-                    return Err(self.differs(&resource.name, given, wanted));
-                }
+        match layout_conflict(self.graph, uses) {
+            None => Ok(()),
+            Some((name, first, second)) => {
+                Err(self.differs(name, format!("{first:?}"), format!("{second:?} too")))
             }
         }
-        Ok(())
     }
 
-    fn missing(&self, what: &'static str, name: &str) -> PlanError {
+    pub(crate) fn missing(&self, what: &'static str, name: &str) -> PlanError {
         self.mismatch(Mismatch::NotInPass {
             what,
             name: name.to_owned(),
@@ -353,7 +376,6 @@ impl Binder<'_> {
         let is_resource: fn(&BindingKind) -> bool =
             |kind| !matches!(kind, BindingKind::Uniform(_) | BindingKind::Sampler { .. });
         for access in self
-            .pass
             .accesses
             .iter()
             .filter(|access| access.kind != AccessKind::Indirect)
@@ -543,15 +565,11 @@ impl Binder<'_> {
     }
 
     /// How many workgroups cover the dispatch.
-    fn groups(&self, dispatch: &Dispatch) -> Result<Groups, PlanError> {
+    fn groups(&self, dispatch: &Dispatch, workgroup_size: [u32; 3]) -> Result<Groups, PlanError> {
         let groups = match dispatch {
             Dispatch::Fixed(groups) => *groups,
             Dispatch::PerTexel(name) => {
-                let access = self
-                    .pass
-                    .accesses
-                    .iter()
-                    .find(|access| access.binding == *name);
+                let access = self.accesses.iter().find(|access| access.binding == *name);
                 let access = access.ok_or_else(|| self.missing("resource", name))?;
                 let ResourceDesc::Texture(desc) =
                     self.graph.resources[access.resource as usize].desc
@@ -564,7 +582,7 @@ impl Binder<'_> {
                 } else {
                     access.range.layers
                 };
-                let [x, y, z] = self.kernel.workgroup_size.map(|size| size.max(1));
+                let [x, y, z] = workgroup_size.map(|size| size.max(1));
                 [
                     extent.width.div_ceil(x),
                     extent.height.div_ceil(y),
@@ -573,7 +591,6 @@ impl Binder<'_> {
             }
             Dispatch::Indirect { offset } => {
                 let access = self
-                    .pass
                     .accesses
                     .iter()
                     .find(|access| access.kind == AccessKind::Indirect);

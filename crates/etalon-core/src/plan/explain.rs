@@ -99,6 +99,19 @@ impl fmt::Display for Plan {
                         step.name, kernel.0.name, step.reason
                     )?;
                 }
+                Step::Raster(raster) => {
+                    let (draws, colours) = (raster.draws.len(), raster.colours.len());
+                    let depth = if raster.depth.is_some() {
+                        " and depth"
+                    } else {
+                        ""
+                    };
+                    writeln!(
+                        f,
+                        "{index:4}  {} ({draws} draws into {colours} colours{depth}): {}",
+                        step.name, step.reason
+                    )?;
+                }
                 _ => writeln!(f, "{index:4}  {}: {}", step.name, step.reason)?,
             }
         }

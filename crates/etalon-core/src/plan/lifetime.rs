@@ -176,6 +176,11 @@ impl Numbering<'_> {
                     *buffer = self.number(*buffer, at);
                 }
             }
+            Step::Raster(raster) => {
+                for resource in raster.resources_mut() {
+                    *resource = self.number(*resource, at);
+                }
+            }
             Step::ClearTexture { resource, .. }
             | Step::ClearBuffer { resource }
             | Step::Capture { resource, .. } => {

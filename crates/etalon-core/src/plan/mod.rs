@@ -28,6 +28,7 @@ mod error;
 mod explain;
 mod lifetime;
 mod order;
+mod raster;
 #[cfg(test)]
 mod tests;
 
@@ -37,6 +38,10 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 pub use error::PlanError;
+pub use raster::{
+    DrawExtent, PlannedAttribute, PlannedDraw, PlannedIndices, PlannedTarget, PlannedVertices,
+    RasterStep,
+};
 
 use crate::graph::{ClearValue, Graph, ResourceDesc, Subresources};
 use crate::kernel::{Arithmetic, Kernel, KernelLibrary};
@@ -144,12 +149,20 @@ pub enum Usage {
     CopySource,
     /// Target of a copy or a clear (`TRANSFER_DST_OPTIMAL`).
     CopyTarget,
-    /// Workgroup counts of an indirect dispatch.
+    /// Workgroup counts of an indirect dispatch, or the extents of indirect draws.
     Indirect,
+    /// Colour target of draws (`COLOR_ATTACHMENT_OPTIMAL`).
+    ColourTarget,
+    /// Depth target of draws (`DEPTH_STENCIL_ATTACHMENT_OPTIMAL`).
+    DepthTarget,
+    /// What vertex kernels are fed from.
+    Vertices,
+    /// Indices of vertices.
+    Indices,
 }
 
 impl Usage {
-    const ALL: [Self; 7] = [
+    const ALL: [Self; 11] = [
         Self::Sampled,
         Self::StorageRead,
         Self::StorageWrite,
@@ -157,6 +170,10 @@ impl Usage {
         Self::CopySource,
         Self::CopyTarget,
         Self::Indirect,
+        Self::ColourTarget,
+        Self::DepthTarget,
+        Self::Vertices,
+        Self::Indices,
     ];
 
     /// Whether contents may change.
@@ -164,7 +181,11 @@ impl Usage {
     pub const fn writes(self) -> bool {
         matches!(
             self,
-            Self::StorageWrite | Self::StorageUpdate | Self::CopyTarget
+            Self::StorageWrite
+                | Self::StorageUpdate
+                | Self::CopyTarget
+                | Self::ColourTarget
+                | Self::DepthTarget
         )
     }
 
@@ -178,7 +199,10 @@ impl Usage {
                 Usage::StorageRead | Usage::StorageWrite | Usage::StorageUpdate => 1,
                 Usage::CopySource => 2,
                 Usage::CopyTarget => 3,
-                Usage::Indirect => 4,
+                Usage::ColourTarget => 4,
+                Usage::DepthTarget => 5,
+                // Of buffers, which have no layout.
+                Usage::Indirect | Usage::Vertices | Usage::Indices => 6,
             }
         }
         layout(self) == layout(other)
@@ -187,7 +211,7 @@ impl Usage {
 
 /// A set of [`Usage`]s.
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
-pub struct UsageSet(u8);
+pub struct UsageSet(u16);
 
 impl UsageSet {
     /// The empty set.
@@ -407,6 +431,8 @@ pub enum Step {
         /// How much of it.
         groups: Groups,
     },
+    /// Draws.
+    Raster(RasterStep),
     /// Fills part of a texture.
     ClearTexture {
         /// The texture.
@@ -569,6 +595,16 @@ impl Plan {
             .iter()
             .filter(|step| matches!(step.step, Step::Dispatch { .. }))
             .count()
+    }
+
+    /// Draws of all steps.
+    #[must_use]
+    pub fn draw_count(&self) -> usize {
+        let draws = self.steps.iter().map(|step| match &step.step {
+            Step::Raster(raster) => raster.draws.len(),
+            _ => 0,
+        });
+        draws.sum()
     }
 
     /// The plan as JSON, for other programs.

@@ -1,5 +1,7 @@
 //! Culling, depth, blending and what part of the targets is drawn to.
 
+use std::hash::{Hash, Hasher};
+
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -55,6 +57,12 @@ pub struct DepthBias {
     pub clamp: f32,
 }
 
+impl Hash for DepthBias {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        (self.constant, self.slope.to_bits(), self.clamp.to_bits()).hash(state);
+    }
+}
+
 impl DepthBias {
     /// Whether nothing is added.
     #[must_use]
@@ -68,7 +76,7 @@ impl DepthBias {
 /// With standard depth, 0 near and 1 far, [`Compare::Less`] draws what is
 /// nearer; with reversed depth, 1 near and 0 far or at infinity,
 /// [`Compare::Greater`] does.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Hash, Serialize, Deserialize)]
 pub struct DepthState {
     /// `fragment OP depth` must hold for a fragment to be drawn.
     pub compare: Compare,
@@ -224,6 +232,14 @@ impl ColourWrites {
         blue: true,
         alpha: true,
     };
+
+    /// None.
+    pub const NONE: Self = Self {
+        red: false,
+        green: false,
+        blue: false,
+        alpha: false,
+    };
 }
 
 impl Default for ColourWrites {
@@ -242,7 +258,7 @@ pub struct TargetState {
 }
 
 /// What a draw does beside its kernel.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Hash, Serialize, Deserialize)]
 pub struct RasterState {
     /// How vertices make triangles.
     pub topology: Topology,
@@ -273,6 +289,14 @@ pub struct Viewport {
     pub far: f32,
 }
 
+impl Hash for Viewport {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        [self.x, self.y, self.width, self.height, self.near, self.far]
+            .map(f32::to_bits)
+            .hash(state);
+    }
+}
+
 impl Viewport {
     /// All of a target, depth from 0 to 1.
     #[must_use]
@@ -289,7 +313,7 @@ impl Viewport {
 }
 
 /// The part of the targets, in pixels, that is drawn to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Scissor {
     /// Left edge.
     pub x: u32,

@@ -86,6 +86,12 @@ impl CpuBackend {
                 bindings,
                 groups,
             } => self.dispatch(plan, name, &kernel.0, bindings, groups, resources)?,
+            Step::Raster(_) => {
+                return Err(BackendError::Unsupported {
+                    step: name.to_owned(),
+                    what: "draws".to_owned(),
+                });
+            }
             Step::ClearTexture {
                 resource,
                 range,

@@ -55,9 +55,9 @@ fn imports_and_features_decide_what_is_generated() {
         assert!(!kernel.wgsl.contains("unused"), "{}", kernel.wgsl);
         assert!(!kernel.wgsl.contains("import"), "{}", kernel.wgsl);
         assert_eq!(kernel.name, "test/kernel");
-        assert_eq!(kernel.entry_point, "main");
-        assert_eq!(kernel.workgroup_size, [8, 1, 1]);
-        assert!(kernel.main().name.is_none() || kernel.main().name.as_deref() == Some("main"));
+        assert_eq!(kernel.compute().unwrap().entry_point, "main");
+        assert_eq!(kernel.compute().unwrap().workgroup_size, [8, 1, 1]);
+        assert!(main(kernel).name.is_none() || main(kernel).name.as_deref() == Some("main"));
     }
     // `square` is only called with an override, so it is still a function.
     assert_eq!(strict.module.functions.len(), 1);
@@ -73,7 +73,7 @@ fn constants_are_resolved_in_every_type() {
         .constant("negate", 1.0)
         .constant("inner", 0.1);
     let kernel = library.get(&request, Arithmetic::Strict).unwrap();
-    assert_eq!(kernel.workgroup_size, [16, 1, 1]);
+    assert_eq!(kernel.compute().unwrap().workgroup_size, [16, 1, 1]);
     assert!(kernel.module.overrides.is_empty());
     let literals: Vec<naga::Literal> = kernel
         .module
@@ -142,7 +142,7 @@ fn literals_keep_their_bits() {
         ] {
             let kernel = compile_one(&evaluating(&spelling), Arithmetic::Strict)
                 .unwrap_or_else(|error| panic!("{spelling}: {error}"));
-            let found = kernel.main().expressions.iter().any(|(_, expression)| {
+            let found = main(&kernel).expressions.iter().any(|(_, expression)| {
                 matches!(expression, naga::Expression::Literal(naga::Literal::F32(f))
                     if f.to_bits() == bits)
             });

@@ -40,7 +40,12 @@ fn every_expression_leads_back_to_its_own_text() {
             .get(&KernelRequest::new(path.clone()), Arithmetic::Strict)
             .unwrap_or_else(|error| panic!("{error}"));
         let functions = kernel.module.functions.iter().map(|(_, function)| function);
-        for function in functions.chain([kernel.main()]) {
+        let entries = kernel
+            .module
+            .entry_points
+            .iter()
+            .map(|entry| &entry.function);
+        for function in functions.chain(entries) {
             for (handle, _) in function.expressions.iter() {
                 let span = function.expressions.get_span(handle);
                 let Some(range) = span.to_range() else {

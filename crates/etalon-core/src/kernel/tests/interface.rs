@@ -16,7 +16,7 @@ fn binding(declaration: &str, body: &str) -> BindingKind {
         panic!("{:?}", kernel.bindings)
     };
     assert_eq!((binding.group, binding.binding), (0, 7));
-    assert_eq!(kernel.workgroup_size, [4, 2, 3]);
+    assert_eq!(kernel.compute().unwrap().workgroup_size, [4, 2, 3]);
     binding.kind.clone()
 }
 

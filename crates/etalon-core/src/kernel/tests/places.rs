@@ -197,9 +197,9 @@ fn spans_of_the_module_lead_to_lines() {
             .source_map
             .locate(function.expressions.get_span(handle))
     };
-    assert_eq!(literal(kernel.main(), 1022.0), find("1022.0")[0]);
+    assert_eq!(literal(main(&kernel), 1022.0), find("1022.0")[0]);
     assert_eq!(
-        literal(kernel.main(), 1022.0).to_string(),
+        literal(main(&kernel), 1022.0).to_string(),
         "test/kernel.wesl:40:14"
     );
     let weight = kernel

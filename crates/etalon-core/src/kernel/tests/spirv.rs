@@ -94,7 +94,12 @@ fn half_floats_are_not_contracted_and_ask_for_no_more_than_they_need() {
     };
     for (buffer, in_buffers) in [("f16", true), ("f32", false)] {
         let kernel = compile_one(&text(buffer), Arithmetic::Strict).unwrap();
-        let words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+        let words = spirv(
+            &kernel,
+            naga::ShaderStage::Compute,
+            &SpirvOptions::default(),
+        )
+        .unwrap();
         let mut expected = contractible(&words);
         let mut found = decorated(&words);
         assert!(expected.len() >= 11, "{expected:?}");
@@ -113,7 +118,7 @@ fn half_floats_are_not_contracted_and_ask_for_no_more_than_they_need() {
         }
     }
     let plain = compile_one(&evaluating("x * x"), Arithmetic::Strict).unwrap();
-    let words = spirv(&plain, &SpirvOptions::default()).unwrap();
+    let words = spirv(&plain, naga::ShaderStage::Compute, &SpirvOptions::default()).unwrap();
     assert!(!capabilities(&words).contains(&float16));
 }
 
@@ -121,7 +126,12 @@ fn half_floats_are_not_contracted_and_ask_for_no_more_than_they_need() {
 fn contraction_is_forbidden_in_strict_kernels_only() {
     let text = evaluating("-x + x - x * x / v.x + (v * x).z + (m * x)[0].y");
     let strict = compile_one(&text, Arithmetic::Strict).unwrap();
-    let words = spirv(&strict, &SpirvOptions::default()).unwrap();
+    let words = spirv(
+        &strict,
+        naga::ShaderStage::Compute,
+        &SpirvOptions::default(),
+    )
+    .unwrap();
     let mut expected = contractible(&words);
     let mut found = decorated(&words);
     assert!(expected.len() >= 9, "{expected:?}");
@@ -130,7 +140,7 @@ fn contraction_is_forbidden_in_strict_kernels_only() {
     assert_eq!(found, expected);
 
     let fast = compile_one(&text, Arithmetic::Fast).unwrap();
-    let fast = spirv(&fast, &SpirvOptions::default()).unwrap();
+    let fast = spirv(&fast, naga::ShaderStage::Compute, &SpirvOptions::default()).unwrap();
     assert_eq!(decorated(&fast), [0_u32; 0]);
     // Nothing else is different.
     let plain: Vec<u32> = instructions(&words)
@@ -146,7 +156,12 @@ fn contraction_is_forbidden_in_strict_kernels_only() {
 #[test]
 fn every_arithmetic_opcode_of_wgsl_is_covered() {
     let kernel = compile_one(&all_arithmetic(), Arithmetic::Fast).unwrap();
-    let words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+    let words = spirv(
+        &kernel,
+        naga::ShaderStage::Compute,
+        &SpirvOptions::default(),
+    )
+    .unwrap();
     let found: Vec<u16> = instructions(&words)
         .into_iter()
         .map(|(opcode, _)| opcode)
@@ -194,7 +209,8 @@ fn the_validator_accepts_every_kernel() {
     bounded.names = false;
     for (name, kernel) in &modules {
         for options in [plain, bounded] {
-            let words = spirv(kernel, &options).unwrap_or_else(|error| panic!("{error}"));
+            let words = spirv(kernel, naga::ShaderStage::Compute, &options)
+                .unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(words[0], 0x0723_0203);
             assert_eq!(words[1], 0x0001_0300, "SPIR-V 1.3");
             match validate(&words) {
@@ -209,7 +225,12 @@ fn the_validator_accepts_every_kernel() {
 #[test]
 fn a_decoration_in_the_wrong_place_is_noticed() {
     let kernel = compile_one(&evaluating("x * x"), Arithmetic::Strict).unwrap();
-    let mut words = spirv(&kernel, &SpirvOptions::default()).unwrap();
+    let mut words = spirv(
+        &kernel,
+        naga::ShaderStage::Compute,
+        &SpirvOptions::default(),
+    )
+    .unwrap();
     let target = decorated(&words)[0];
     words.extend([3 << 16 | 71, target, 42]);
     if let Some(result) = validate(&words) {
@@ -226,7 +247,7 @@ fn options_change_what_they_say() {
         }";
     let kernel = compile_one(text, Arithmetic::Strict).unwrap();
     let count = |options: &SpirvOptions, opcode: u16| {
-        let words = spirv(&kernel, options).unwrap();
+        let words = spirv(&kernel, naga::ShaderStage::Compute, options).unwrap();
         instructions(&words)
             .iter()
             .filter(|(it, _)| *it == opcode)

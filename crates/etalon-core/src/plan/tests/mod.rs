@@ -3,6 +3,7 @@
 
 mod bind;
 mod random;
+mod raster;
 mod shape;
 
 use crate::Format;

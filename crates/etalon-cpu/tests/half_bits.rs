@@ -108,9 +108,7 @@ fn bit_casts_keep_every_bit() {
         let signed = i32::from(want as u16 as i16);
         assert_eq!(got[0], want, "{h:?}");
         assert_eq!(got[1], signed as u32, "{h:?}");
-        for at in 2..=6 {
-            assert_eq!(got[at], want, "{at}: {h:?}");
-        }
+        assert_eq!(got[2..7], [want; 5], "{h:?}");
         assert_eq!(got[7], want ^ 0x8000, "{h:?}");
         assert_eq!(got[8], 1, "{h:?}");
         assert_eq!(got[9], u32::from(signed < 0x3c00), "{h:?}");

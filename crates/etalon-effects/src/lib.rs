@@ -7,6 +7,7 @@
 //!
 //! | Effect | What it does | Kernels |
 //! |---|---|---|
+//! | [`geometry`](mod@geometry) | depth, velocity and G-buffer, drawn | `shaders/geometry` |
 //! | [`ssr`](mod@ssr) | screen-space reflection | `shaders/ssr` |
 //! | [`exposure`](mod@exposure) | average luminance and adaptation | `shaders/exposure` |
 //! | [`bloom`](mod@bloom) | glow of bright light | `shaders/bloom` |
@@ -33,6 +34,7 @@ mod check;
 pub mod composite;
 mod error;
 pub mod exposure;
+pub mod geometry;
 pub mod registry;
 mod scene;
 pub mod ssr;

@@ -1,0 +1,62 @@
+//! Who looks, and from where.
+
+use glam::{DMat3, DMat4};
+
+use crate::check::Settings;
+use crate::{CameraParams, SettingError};
+
+/// A camera in the world, and where it was.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// How view space becomes the picture.
+    pub camera: CameraParams,
+    /// From the world to view space: a rotation and a translation.
+    pub view: DMat4,
+    /// The same one frame earlier.
+    pub previous: DMat4,
+}
+
+impl View {
+    /// Checks the camera, and that the matrices are finite and can be undone.
+    ///
+    /// # Errors
+    /// The first number that cannot be.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        self.camera.validate()?;
+        let check = Settings("geometry");
+        for (field, matrix) in [("view", self.view), ("previous view", self.previous)] {
+            // A rotation's is 1; NaN and infinities fail as well.
+            check.range(field, matrix.determinant().abs() as f32, 0.5, 2.0)?;
+            let largest = matrix.to_cols_array().into_iter().fold(0.0, f64::max);
+            check.range(field, largest as f32, 0.0, 1e12)?;
+        }
+        Ok(())
+    }
+
+    /// From view space to that of one frame earlier.
+    pub(super) fn to_previous(&self) -> DMat4 {
+        self.previous * self.view.inverse()
+    }
+
+    /// Turns normals of something in the world into view space: the inverse
+    /// transpose, which keeps them at right angles to what is stretched.
+    pub(super) fn normal_matrix(&self, world: DMat4) -> DMat4 {
+        let linear = DMat3::from_mat4(self.view * world);
+        // Of what has no volume any normal will do: none of it is seen.
+        let turned = match linear.determinant() {
+            d if d.is_normal() => linear.inverse().transpose(),
+            _ => linear,
+        };
+        // Only the direction counts; of the size of one it stays inside f32.
+        let size = turned
+            .to_cols_array()
+            .into_iter()
+            .map(f64::abs)
+            .fold(0.0, f64::max);
+        DMat4::from_mat3(if size.is_normal() {
+            turned * size.recip()
+        } else {
+            linear
+        })
+    }
+}

@@ -8,6 +8,7 @@
 //!
 //! * [`shapes`]: meshes by closed forms.
 //! * [`gltf`]: models from glTF 2.0 files.
+//! * [`Drawable`]: what backends draw them from.
 //! * [`flat_normals`], [`tangents`]: what meshes may come without.
 //! * [`crate::trace::TriangleScene`]: what rays see of a snapshot.
 //!
@@ -27,6 +28,7 @@
 
 mod animation;
 mod derive;
+mod drawable;
 mod error;
 pub mod gltf;
 mod light;
@@ -40,11 +42,13 @@ mod texture;
 
 pub use animation::{Animation, Interpolation, Track, Values};
 pub use derive::{flat_normals, tangents};
+pub use drawable::{Drawable, Imported, view};
 pub use error::{ModelError, Place};
+pub use etalon_effects::geometry::DrawClass;
 pub use light::{Light, LightKind};
 pub use material::{AlphaMode, Material, TextureUse, UvTransform, Volume};
 pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, Vertices};
 pub use moment::{Instance, Instances, Moment, PlacedLight, Snapshot};
-pub use node::{DrawClass, MAX_JOINTS, Node, Part, Skin, Transform};
+pub use node::{MAX_JOINTS, Node, Part, Skin, Transform};
 pub use parts::{MAX_INSTANCES, Model, ModelParts, Viewpoint};
 pub use texture::{Filter, Image, MAX_IMAGE_SIDE, Sampler, Texture, Wrap};

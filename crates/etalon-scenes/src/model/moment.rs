@@ -2,9 +2,11 @@
 
 use glam::{DMat4, DVec3, Mat4, Vec3};
 
+use etalon_effects::geometry::DrawClass;
+
 use super::animation::Pose;
 use super::error::{Check, ModelError, Place};
-use super::node::{DrawClass, Transform, compose, quaternion};
+use super::node::{Transform, compose, quaternion};
 use super::parts::{Model, Viewpoint};
 use crate::camera::{self, Camera, CameraError};
 

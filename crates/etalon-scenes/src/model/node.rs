@@ -2,19 +2,9 @@
 
 use glam::{DMat4, DQuat, DVec3};
 
-use super::error::{Check, ModelError, Place, finite};
+use etalon_effects::geometry::DrawClass;
 
-/// When in a frame an instance is drawn, in the order of a prepass that writes
-/// depth and velocity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum DrawClass {
-    /// Close to the camera and moving with it.
-    Weapon,
-    /// Never moving: its velocity is the camera's alone.
-    Static,
-    /// Moving, by itself or by its joints.
-    Dynamic,
-}
+use super::error::{Check, ModelError, Place, finite};
 
 /// A place relative to a parent's.
 #[derive(Clone, Copy, Debug, PartialEq)]

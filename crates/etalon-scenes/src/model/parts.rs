@@ -1,11 +1,13 @@
 //! A model: what there is, checked as a whole.
 
+use etalon_effects::geometry::DrawClass;
+
 use super::animation::{Animation, Values};
 use super::error::{Check, ModelError, Place};
 use super::light::Light;
 use super::material::Material;
 use super::mesh::Mesh;
-use super::node::{DrawClass, Node, Skin, Transform};
+use super::node::{Node, Skin, Transform};
 use super::texture::{Image, Texture};
 use crate::camera::Camera;
 

@@ -56,12 +56,16 @@ impl WgpuBackend {
     /// [`PASSTHROUGH_SHADERS`](wgpu::Features::PASSTHROUGH_SHADERS) on Vulkan
     /// strict arithmetic is kept; with [`SHADER_F16`](wgpu::Features::SHADER_F16)
     /// kernels may have `f16`; with
+    /// [`INDIRECT_FIRST_INSTANCE`](wgpu::Features::INDIRECT_FIRST_INSTANCE) plans
+    /// may draw indirectly, which is refused without, since a record's first
+    /// instance could not be kept; with
     /// [`TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES`](wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES),
     /// and the adapter given, the adapter's own formats can be stored to.
     ///
     /// Without its adapter the device is taken to have the texture formats that
     /// WebGPU guarantees. Whether the workgroup counts of indirect dispatches are
-    /// held against the limits is up to the
+    /// held against the limits, and the records of indirect draws against their
+    /// vertices and indices, is up to the
     /// [flags](wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL) of the engine's
     /// instance.
     ///
@@ -119,14 +123,14 @@ impl WgpuBackend {
     /// staging buffers. Histories stay.
     pub fn trim(&mut self) {
         self.prepared.truncate(1);
-        self.pipelines
-            .retain(|_, pipeline| std::sync::Arc::strong_count(pipeline) > 1);
+        self.pipelines.trim();
         self.staging.trim();
         for prepared in &mut self.prepared {
             prepared.views.clear();
             for step in &mut prepared.steps {
                 match step {
                     PreparedStep::Dispatch { groups, .. } => *groups = Default::default(),
+                    PreparedStep::Raster(raster) => raster.trim(),
                     PreparedStep::Clear(clear) => clear.trim(),
                     PreparedStep::Capture(_) | PreparedStep::Plain => {}
                 }

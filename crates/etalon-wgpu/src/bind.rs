@@ -9,11 +9,11 @@ use etalon_core::resource::SamplerDesc;
 use crate::convert;
 use crate::fault::unsupported;
 use crate::gpu::Gpu;
-use crate::pipeline::{Pipeline, uniform_bytes};
+use crate::pipeline::uniform_bytes;
 
-/// How many bind groups are kept for each step of a prepared plan.
+/// How many bind groups are kept for each dispatch and draw of a prepared plan.
 ///
-/// A step has one for every combination of the textures it has met: two where
+/// Each has one for every combination of the textures it has met: two where
 /// it uses a history, times those an engine alternates between. Past this many
 /// the least recently used is dropped.
 pub const BIND_GROUPS_PER_STEP: usize = 8;
@@ -191,7 +191,7 @@ impl Samplers {
     }
 }
 
-/// What a dispatch binds, in the order of the kernel's bindings.
+/// What a dispatch or draw binds, in the order of the kernel's bindings.
 pub(crate) fn touched<'a>(
     bindings: &'a [Bound],
     physicals: &'a [Physical],
@@ -214,12 +214,12 @@ pub(crate) struct BindContext<'a> {
 }
 
 impl BindContext<'_> {
-    /// The bind group of a dispatch.
+    /// The bind group of a dispatch or draw.
     pub(crate) fn group(
         &self,
         step: &str,
         kernel: &Kernel,
-        pipeline: &Pipeline,
+        layout: &wgpu::BindGroupLayout,
         bindings: &[Bound],
     ) -> Result<wgpu::BindGroup, BackendError> {
         // Views first, since the entries borrow them.
@@ -248,7 +248,7 @@ impl BindContext<'_> {
                     .device
                     .create_bind_group(&wgpu::BindGroupDescriptor {
                         label: Some(step),
-                        layout: &pipeline.layout,
+                        layout,
                         entries: &entries,
                     })
             })

@@ -8,7 +8,7 @@ use etalon_core::Format;
 use etalon_core::backend::BackendError;
 use etalon_core::format::SampleKind;
 use etalon_core::graph::{ResourceDesc, Subresources};
-use etalon_core::kernel::BindingKind;
+use etalon_core::kernel::{BindingKind, Kernel};
 use etalon_core::plan::{
     Bound, Groups, Plan, PlannedResource, PlannedStep, ResourceKind, Step, UniformSlice,
 };
@@ -19,6 +19,7 @@ use crate::fault::unsupported;
 use crate::gl;
 use crate::gpu::Gpu;
 use crate::pipeline::uniform_bytes;
+use crate::raster;
 
 /// A plan that contradicts itself.
 fn malformed(step: &str, what: impl std::fmt::Display) -> BackendError {
@@ -157,18 +158,18 @@ fn check_copy_source(gpu: &Gpu, desc: &TextureDesc) -> Result<(), String> {
 }
 
 /// Checks one step.
-struct Checker<'a> {
-    gpu: &'a Gpu,
+pub(crate) struct Checker<'a> {
+    pub(crate) gpu: &'a Gpu,
     plan: &'a Plan,
     step: &'a PlannedStep,
 }
 
 impl Checker<'_> {
-    fn malformed(&self, what: impl std::fmt::Display) -> BackendError {
+    pub(crate) fn malformed(&self, what: impl std::fmt::Display) -> BackendError {
         malformed(&self.step.name, what)
     }
 
-    fn unsupported(&self, what: impl Into<String>) -> BackendError {
+    pub(crate) fn unsupported(&self, what: impl Into<String>) -> BackendError {
         unsupported(&self.step.name, what)
     }
 
@@ -179,7 +180,11 @@ impl Checker<'_> {
             .ok_or_else(|| self.malformed(format_args!("there is no resource {index}")))
     }
 
-    fn texture(&self, index: u32, range: Subresources) -> Result<&TextureDesc, BackendError> {
+    pub(crate) fn texture(
+        &self,
+        index: u32,
+        range: Subresources,
+    ) -> Result<&TextureDesc, BackendError> {
         let resource = self.resource(index)?;
         let ResourceDesc::Texture(desc) = &resource.desc else {
             return Err(self.malformed(format_args!("`{}` is no texture", resource.name)));
@@ -195,7 +200,7 @@ impl Checker<'_> {
         Ok(desc)
     }
 
-    fn buffer(&self, index: u32) -> Result<u64, BackendError> {
+    pub(crate) fn buffer(&self, index: u32) -> Result<u64, BackendError> {
         let resource = self.resource(index)?;
         match &resource.desc {
             ResourceDesc::Buffer(desc) => Ok(desc.bytes),
@@ -212,15 +217,13 @@ impl Checker<'_> {
                 bindings,
                 groups,
             } => {
-                if kernel.0.bindings.len() != bindings.len() {
-                    return Err(self.malformed("the kernel has more or fewer bindings"));
+                if kernel.0.compute().is_none() {
+                    return Err(self.malformed("it dispatches a raster kernel"));
                 }
-                for (binding, bound) in kernel.0.bindings.iter().zip(bindings) {
-                    self.bound(&binding.name, &binding.kind, bound)?;
-                }
+                self.bindings(&kernel.0, bindings)?;
                 self.groups(groups)
             }
-            Step::Raster(_) => Err(self.unsupported("draws")),
+            Step::Raster(raster) => raster::check(self, raster),
             Step::ClearTexture {
                 resource, range, ..
             } => {
@@ -264,6 +267,17 @@ impl Checker<'_> {
                 }
             },
         }
+    }
+
+    /// Checks what the bindings of a kernel are given.
+    pub(crate) fn bindings(&self, kernel: &Kernel, bindings: &[Bound]) -> Result<(), BackendError> {
+        if kernel.bindings.len() != bindings.len() {
+            return Err(self.malformed("the kernel has more or fewer bindings"));
+        }
+        for (binding, bound) in kernel.bindings.iter().zip(bindings) {
+            self.bound(&binding.name, &binding.kind, bound)?;
+        }
+        Ok(())
     }
 
     fn bound(&self, name: &str, kind: &BindingKind, bound: &Bound) -> Result<(), BackendError> {

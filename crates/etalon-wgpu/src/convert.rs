@@ -190,7 +190,7 @@ pub(crate) fn sampler(desc: &SamplerDesc) -> wgpu::SamplerDescriptor<'static> {
     }
 }
 
-const fn compare(compare: Compare) -> wgpu::CompareFunction {
+pub(crate) const fn compare(compare: Compare) -> wgpu::CompareFunction {
     match compare {
         Compare::Never => wgpu::CompareFunction::Never,
         Compare::Less => wgpu::CompareFunction::Less,

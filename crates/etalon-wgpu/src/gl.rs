@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 use etalon_core::backend::BackendError;
 use etalon_core::graph::Subresources;
-use etalon_core::kernel::BindingKind;
+use etalon_core::kernel::{BindingKind, Kernel};
 use etalon_core::plan::{Bound, Plan, ResourceKind, Step};
 
 use crate::fault::unsupported;
@@ -37,34 +37,46 @@ fn texture(plan: &Plan, resource: u32) -> Texture<'_> {
     }
 }
 
-/// Refuses dispatches that sample and store different mips of one texture.
+/// Refuses steps that sample and write different mips of one texture.
 pub(crate) fn check(plan: &Plan) -> Result<(), BackendError> {
     let mut sampled: BTreeMap<Texture<'_>, Vec<Subresources>> = BTreeMap::new();
     let mut stored = Vec::new();
     for step in &plan.steps {
-        let Step::Dispatch {
-            kernel, bindings, ..
-        } = &step.step
-        else {
-            continue;
-        };
-        let mut here: BTreeMap<Texture<'_>, Subresources> = BTreeMap::new();
-        for (binding, bound) in kernel.0.bindings.iter().zip(bindings) {
-            let Bound::Texture { resource, range } = bound else {
-                continue;
-            };
-            let texture = texture(plan, *resource);
-            if !matches!(binding.kind, BindingKind::Texture { .. }) {
-                stored.push((texture, *range, &step.name, &binding.name));
-                continue;
+        let mut bound: Vec<(&Kernel, &[Bound])> = Vec::new();
+        match &step.step {
+            Step::Dispatch {
+                kernel, bindings, ..
+            } => bound.push((&kernel.0, bindings)),
+            Step::Raster(raster) => {
+                // A framebuffer takes the mips that can be sampled.
+                for target in raster.colours.iter().chain(&raster.depth) {
+                    let texture = texture(plan, target.resource);
+                    stored.push((texture, target.range, &step.name, "a target"));
+                }
+                let draws = raster.draws.iter();
+                bound.extend(draws.map(|draw| (&*draw.kernel.0, draw.bindings.as_slice())));
             }
-            sampled.entry(texture.clone()).or_default().push(*range);
-            let before = here.entry(texture).or_insert(*range);
-            if (before.mip, before.mips) != (range.mip, range.mips) {
-                return Err(unsupported(
-                    &step.name,
-                    format!("two runs of mips of `{}` at once", binding.name),
-                ));
+            _ => {}
+        }
+        for (kernel, bindings) in bound {
+            let mut here: BTreeMap<Texture<'_>, Subresources> = BTreeMap::new();
+            for (binding, bound) in kernel.bindings.iter().zip(bindings) {
+                let Bound::Texture { resource, range } = bound else {
+                    continue;
+                };
+                let texture = texture(plan, *resource);
+                if !matches!(binding.kind, BindingKind::Texture { .. }) {
+                    stored.push((texture, *range, &step.name, &binding.name));
+                    continue;
+                }
+                sampled.entry(texture.clone()).or_default().push(*range);
+                let before = here.entry(texture).or_insert(*range);
+                if (before.mip, before.mips) != (range.mip, range.mips) {
+                    return Err(unsupported(
+                        &step.name,
+                        format!("two runs of mips of `{}` at once", binding.name),
+                    ));
+                }
             }
         }
     }

@@ -141,6 +141,12 @@ impl Gpu {
         self.features.contains(wgpu::Features::SHADER_F16)
     }
 
+    /// Whether the records of indirect draws may begin at any instance.
+    pub(crate) fn draws_first_instances(&self) -> bool {
+        self.features
+            .contains(wgpu::Features::INDIRECT_FIRST_INSTANCE)
+    }
+
     /// Whether the device's own clock tells the time around any command.
     pub(crate) fn tells_time(&self) -> bool {
         let queries =

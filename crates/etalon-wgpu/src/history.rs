@@ -2,11 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use etalon_core::Format;
 use etalon_core::backend::BackendError;
 use etalon_core::graph::Subresources;
 use etalon_core::plan::Plan;
-use etalon_core::resource::TextureDesc;
+use etalon_core::resource::{Dimension, TextureDesc};
 
 use crate::bind::Physical;
 use crate::clear::Clear;
@@ -62,7 +61,8 @@ fn usages(desc: &TextureDesc, features: &wgpu::TextureFormatFeatures) -> wgpu::T
         | wgpu::TextureUsages::STORAGE_BINDING
         | wgpu::TextureUsages::COPY_SRC
         | wgpu::TextureUsages::COPY_DST;
-    if desc.format == Format::Depth32Float {
+    // Nothing draws to 3D textures.
+    if desc.dimension != Dimension::D3 {
         wanted |= wgpu::TextureUsages::RENDER_ATTACHMENT;
     }
     wanted & features.allowed_usages

@@ -79,6 +79,7 @@ mod open;
 mod pipeline;
 mod prepare;
 mod probe;
+mod raster;
 mod readback;
 mod record;
 mod spirv;

@@ -39,7 +39,8 @@ const WANTED: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY
     .union(wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES)
     .union(wgpu::Features::FLOAT32_FILTERABLE)
     .union(wgpu::Features::BGRA8UNORM_STORAGE)
-    .union(wgpu::Features::SHADER_F16);
+    .union(wgpu::Features::SHADER_F16)
+    .union(wgpu::Features::INDIRECT_FIRST_INSTANCE);
 
 fn instance(backends: wgpu::Backends, validation: bool) -> wgpu::Instance {
     // Checking indirect arguments costs a small dispatch each, and is what

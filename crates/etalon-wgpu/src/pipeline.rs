@@ -32,20 +32,14 @@ impl Pipeline {
         let entries = kernel
             .bindings
             .iter()
-            .map(|binding| layout_entry(gpu, binding, step))
+            .map(|binding| layout_entry(gpu, binding, wgpu::ShaderStages::COMPUTE, step))
             .collect::<Result<Vec<_>, _>>()?;
         let module = if gpu.passes_spirv() {
-            spirv::module(gpu, kernel)
+            spirv::module(gpu, kernel, naga::ShaderStage::Compute)
         } else {
             translated(gpu, kernel)
         };
-        let module = module.map_err(|error| match error {
-            ModuleError::Kernel(error) => BackendError::Kernel {
-                step: step.to_owned(),
-                error,
-            },
-            ModuleError::Fault(fault) => fault.of_kernel(step),
-        })?;
+        let module = module.map_err(|error| error.of(step))?;
         gpu.tally.kernels.add(1);
         let (raw, layout) = gpu
             .guarded(|| {
@@ -81,7 +75,7 @@ impl Pipeline {
 }
 
 /// The shader module of a kernel as wgpu translates it.
-fn translated(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleError> {
+pub(crate) fn translated(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleError> {
     gpu.guarded(|| {
         gpu.device
             .create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -93,7 +87,7 @@ fn translated(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleEr
 }
 
 /// The device has to have what the kernel needs beyond WebGPU's core.
-fn check_needs(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), BackendError> {
+pub(crate) fn check_needs(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), BackendError> {
     for need in &kernel.needs {
         let (feature, enabled) = match need {
             // wgpu's feature is arithmetic and buffers in one.
@@ -161,9 +155,11 @@ fn check_workgroup(gpu: &Gpu, kernel: &Kernel, step: &str) -> Result<(), Backend
     Ok(())
 }
 
-fn layout_entry(
+/// What a binding is to the stages that see it.
+pub(crate) fn layout_entry(
     gpu: &Gpu,
     binding: &Binding,
+    visibility: wgpu::ShaderStages,
     step: &str,
 ) -> Result<wgpu::BindGroupLayoutEntry, BackendError> {
     if binding.group != 0 {
@@ -223,7 +219,7 @@ fn layout_entry(
     };
     Ok(wgpu::BindGroupLayoutEntry {
         binding: binding.binding,
-        visibility: wgpu::ShaderStages::COMPUTE,
+        visibility,
         ty,
         count: None,
     })

@@ -15,13 +15,27 @@ use crate::convert;
 use crate::fault::unsupported;
 use crate::gpu::Gpu;
 use crate::pipeline::Pipeline;
+use crate::raster::{self, Raster};
 use crate::readback::Readback;
 use crate::tally::Owned;
 use crate::timing::Timing;
 use crate::upload::Import;
 
-/// Pipelines by kernel.
-pub(crate) type Pipelines = HashMap<KernelId, Arc<Pipeline>>;
+/// Every pipeline there is.
+#[derive(Debug, Default)]
+pub(crate) struct Pipelines {
+    compute: HashMap<KernelId, Arc<Pipeline>>,
+    raster: raster::Pipelines,
+}
+
+impl Pipelines {
+    /// Drops what no prepared plan has.
+    pub(crate) fn trim(&mut self) {
+        self.compute
+            .retain(|_, pipeline| Arc::strong_count(pipeline) > 1);
+        self.raster.trim();
+    }
+}
 
 /// A texture or buffer of our own.
 #[derive(Debug)]
@@ -69,6 +83,7 @@ pub(crate) enum PreparedStep {
         pipeline: Arc<Pipeline>,
         groups: PerPhysical<wgpu::BindGroup>,
     },
+    Raster(Raster),
     Clear(Clear),
     Capture(Readback),
     /// Nothing.
@@ -118,11 +133,11 @@ impl Prepared {
                             samplers.add(gpu, desc)?;
                         }
                     }
-                    let pipeline = match pipelines.get(&kernel.0.id) {
+                    let pipeline = match pipelines.compute.get(&kernel.0.id) {
                         Some(pipeline) => pipeline.clone(),
                         None => {
                             let made = Arc::new(Pipeline::new(gpu, &kernel.0, &step.name)?);
-                            pipelines.insert(kernel.0.id, made.clone());
+                            pipelines.compute.insert(kernel.0.id, made.clone());
                             made
                         }
                     };
@@ -131,6 +146,14 @@ impl Prepared {
                         groups: PerPhysical::default(),
                     }
                 }
+                Step::Raster(raster) => PreparedStep::Raster(Raster::new(
+                    gpu,
+                    plan,
+                    &step.name,
+                    raster,
+                    &mut pipelines.raster,
+                    samplers,
+                )?),
                 Step::ClearTexture {
                     resource,
                     range,
@@ -152,11 +175,9 @@ impl Prepared {
                     )?),
                     None => PreparedStep::Plain,
                 },
-                // Refused by the check.
-                Step::Raster(_)
-                | Step::ClearBuffer { .. }
-                | Step::CopyTexture { .. }
-                | Step::CopyBuffer { .. } => PreparedStep::Plain,
+                Step::ClearBuffer { .. } | Step::CopyTexture { .. } | Step::CopyBuffer { .. } => {
+                    PreparedStep::Plain
+                }
             });
         }
         let uniforms = if plan.uniforms.is_empty() {

@@ -9,6 +9,7 @@ use crate::bind::{BindContext, Physical, Samplers, touched};
 use crate::convert;
 use crate::gpu::Gpu;
 use crate::prepare::{Prepared, PreparedStep};
+use crate::raster::{Raster, Recording};
 use crate::timing::{Stamp, Timing};
 
 /// Makes whatever recording with these textures and buffers lacks: in a steady
@@ -38,8 +39,11 @@ pub(crate) fn prepare_steps(
                 PreparedStep::Dispatch { pipeline, groups },
             ) if !empty(count) => {
                 groups.select(touched(bindings, physicals), || {
-                    context.group(&planned.name, &kernel.0, pipeline, bindings)
+                    context.group(&planned.name, &kernel.0, &pipeline.layout, bindings)
                 })?;
+            }
+            (Step::Raster(step), PreparedStep::Raster(raster)) => {
+                raster.prepare(&context, &planned.name, step)?;
             }
             (
                 Step::ClearTexture {
@@ -63,8 +67,9 @@ fn empty(groups: &Groups) -> bool {
 }
 
 /// Records every step. Without `timing`, dispatches that follow each other
-/// share a pass; with it, each has one of its own, whose time is taken. Timing
-/// by the host submits and waits for what is recorded.
+/// share a pass; with it, each has one of its own, whose time is taken. Draws of
+/// a step are a pass of their own either way. Timing by the host submits and
+/// waits for what is recorded.
 pub(crate) fn record(
     encoder: &mut wgpu::CommandEncoder,
     gpu: &Gpu,
@@ -97,9 +102,16 @@ pub(crate) fn record(
         None => {
             let mut steps = plan.steps.iter().zip(&prepared.steps).peekable();
             while let Some((planned, step)) = steps.next() {
-                if !matches!(step, PreparedStep::Dispatch { .. }) {
-                    recorder.transfer(encoder, planned, step);
-                    continue;
+                match step {
+                    PreparedStep::Dispatch { .. } => {}
+                    PreparedStep::Raster(raster) => {
+                        recorder.draw(encoder, planned, raster, None);
+                        continue;
+                    }
+                    _ => {
+                        recorder.transfer(encoder, planned, step);
+                        continue;
+                    }
                 }
                 let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                     label: Some("etalon"),
@@ -143,6 +155,10 @@ impl Recorder<'_> {
         step: &PreparedStep,
         stamp: Option<Stamp<'_>>,
     ) {
+        if let PreparedStep::Raster(raster) = step {
+            self.draw(encoder, planned, raster, stamp);
+            return;
+        }
         let runs = match &planned.step {
             Step::Dispatch { groups, .. } => !empty(groups),
             _ => false,
@@ -162,6 +178,23 @@ impl Recorder<'_> {
         self.transfer(encoder, planned, step);
         if let Some(stamp) = stamp {
             stamp.end(encoder);
+        }
+    }
+
+    fn draw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        planned: &PlannedStep,
+        raster: &Raster,
+        stamp: Option<Stamp<'_>>,
+    ) {
+        if let Step::Raster(step) = &planned.step {
+            let recording = Recording {
+                gpu: self.gpu,
+                plan: self.plan,
+                physicals: self.physicals,
+            };
+            raster.record(encoder, &recording, &planned.name, step, stamp);
         }
     }
 

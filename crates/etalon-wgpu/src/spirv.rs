@@ -1,6 +1,7 @@
 //! Handing SPIR-V to the driver untouched.
 
-use etalon_core::kernel::{Binding, Kernel, KernelError, SpirvOptions, spirv};
+use etalon_core::backend::BackendError;
+use etalon_core::kernel::{Binding, Kernel, KernelError, SpirvOptions, Stages, spirv};
 
 use crate::fault::Fault;
 use crate::gpu::Gpu;
@@ -13,15 +14,37 @@ pub(crate) enum ModuleError {
     Fault(Fault),
 }
 
-/// The shader module of a kernel, from the words that every Vulkan executor of
-/// Etalon runs.
-pub(crate) fn module(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, ModuleError> {
-    let mut words = spirv(kernel, naga::ShaderStage::Compute, &SpirvOptions::default())
+impl ModuleError {
+    /// As an error of the step that needs the kernel.
+    pub(crate) fn of(self, step: &str) -> BackendError {
+        match self {
+            Self::Kernel(error) => BackendError::Kernel {
+                step: step.to_owned(),
+                error,
+            },
+            Self::Fault(fault) => fault.of_kernel(step),
+        }
+    }
+}
+
+/// The shader module of one stage of a kernel, from the words that every Vulkan
+/// executor of Etalon runs.
+pub(crate) fn module(
+    gpu: &Gpu,
+    kernel: &Kernel,
+    stage: naga::ShaderStage,
+) -> Result<wgpu::ShaderModule, ModuleError> {
+    let mut words = spirv(kernel, stage, &SpirvOptions::default())
         .map_err(|error| ModuleError::Kernel(Box::new(error)))?;
+    // Of all stages, since one layout is for all.
     pack_bindings(&mut words, &kernel.bindings);
-    let (name, [x, y, z]) = match kernel.compute() {
-        Some(stage) => (stage.entry_point.as_str(), stage.workgroup_size),
-        None => ("main", [1; 3]),
+    let (name, [x, y, z]) = match (&kernel.stages, stage) {
+        (Stages::Compute(stage), _) => (stage.entry_point.as_str(), stage.workgroup_size),
+        (Stages::Raster(stages), naga::ShaderStage::Fragment) => match &stages.fragment {
+            Some(fragment) => (fragment.entry_point.as_str(), [1; 3]),
+            None => ("fragment", [1; 3]),
+        },
+        (Stages::Raster(stages), _) => (stages.vertex.entry_point.as_str(), [1; 3]),
     };
     let descriptor = wgpu::ShaderModuleDescriptorPassthrough {
         label: Some(&kernel.name),
@@ -38,7 +61,9 @@ pub(crate) fn module(gpu: &Gpu, kernel: &Kernel) -> Result<wgpu::ShaderModule, M
         // validated, with every index into buffers, arrays and textures
         // checked. The bindings they name are those of the explicit layout
         // which is made from the same kernel and with which alone the module is
-        // used.
+        // used. What vertices are fed with, what they hand to fragments and
+        // what those put out is held against layouts, stages and targets before
+        // a pipeline is made.
         #[allow(unsafe_code)]
         unsafe {
             gpu.device.create_shader_module_passthrough(descriptor)

@@ -82,9 +82,18 @@ pub(crate) struct Stamp<'a> {
 }
 
 impl<'a> Stamp<'a> {
-    /// Has a pass take both.
+    /// Has a compute pass take both.
     pub(crate) fn of_pass(self) -> wgpu::ComputePassTimestampWrites<'a> {
         wgpu::ComputePassTimestampWrites {
+            query_set: self.set,
+            beginning_of_pass_write_index: Some(self.first),
+            end_of_pass_write_index: Some(self.first + 1),
+        }
+    }
+
+    /// Has a render pass take both.
+    pub(crate) fn of_render_pass(self) -> wgpu::RenderPassTimestampWrites<'a> {
+        wgpu::RenderPassTimestampWrites {
             query_set: self.set,
             beginning_of_pass_write_index: Some(self.first),
             end_of_pass_write_index: Some(self.first + 1),

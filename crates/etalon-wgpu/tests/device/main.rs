@@ -9,6 +9,7 @@ mod common;
 mod engine;
 mod frames;
 mod kernels;
+mod raster;
 mod refusals;
 mod transfers;
 mod views;

@@ -21,6 +21,8 @@ pub(crate) enum AccessKind {
     Target,
     /// One that is drawn over.
     TargetKept,
+    /// A depth target that draws are compared with and none changes.
+    TargetTested,
     Vertices,
     Indices,
 }
@@ -34,6 +36,7 @@ impl AccessKind {
                 | Self::CopySource
                 | Self::Indirect
                 | Self::TargetKept
+                | Self::TargetTested
                 | Self::Vertices
                 | Self::Indices
         )

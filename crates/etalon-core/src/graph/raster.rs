@@ -259,7 +259,8 @@ impl<'g> RasterPass<'g> {
     }
 
     /// Compares and keeps depth in one mip and layer of a texture, whose new
-    /// version is found as `depth`.
+    /// version is found as `depth`. Depth that is kept and that no draw writes has
+    /// no new version.
     pub fn depth(mut self, target: impl Into<TextureView>, load: Load) -> Self {
         self.depth = Some((attachment(DEPTH, target, load), load));
         self
@@ -326,7 +327,13 @@ impl<'g> RasterPass<'g> {
             draws: Vec::with_capacity(draws.len()),
         };
         let mut accesses: Vec<Access> = colours.into_iter().map(|(access, _)| access).collect();
-        accesses.extend(depth.map(|(access, _)| access));
+        let writes = |draw: &Draw| draw.state.depth.is_some_and(|depth| depth.write);
+        accesses.extend(depth.map(|(mut access, load)| {
+            if load == Load::Keep && !draws.iter().any(writes) {
+                access.kind = AccessKind::TargetTested;
+            }
+            access
+        }));
         for (index, draw) in draws.into_iter().enumerate() {
             let declared = declared(draw, index as u32, &name, &work, &mut accesses)?;
             work.draws.push(declared);

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use crate::format::SampleKind;
 use crate::graph::{
-    Access, AccessKind, ClearValue, DeclaredDraw, Extent, Graph, Load, Pass, RasterWork,
-    ResourceDesc, Slice, Subresources,
+    Access, ClearValue, DeclaredDraw, Extent, Graph, Load, Pass, RasterWork, ResourceDesc, Slice,
+    Subresources,
 };
 use crate::kernel::{Kernel, KernelLibrary, RasterStages, StageValue};
 use crate::plan::bind::{Binder, BoundPass, Use, layout_conflict};
@@ -187,7 +187,7 @@ pub(crate) fn bind_raster(
         } else {
             Usage::DepthTarget
         };
-        uses.push(used(access, usage, access.kind == AccessKind::TargetKept));
+        uses.push(used(access, usage, access.kind.reads()));
     }
     let size = match pass.accesses.first() {
         Some(access) => match graph.resources[access.resource as usize].desc {

@@ -191,12 +191,16 @@ pub fn gbuffer(
         pass = pass.colour(name, target, Load::Clear(ClearValue::Float([0.0; 4])));
     }
     let written = pass.draws(draws).finish()?;
+    let depth = match prepass {
+        Some(prepass) => prepass.depth,
+        None => written.texture("depth")?,
+    };
     Ok(GBuffer {
         colour: written.texture("colour")?,
         normal: written.texture("normal")?,
         specular: written.texture("specular")?,
         emission: written.texture("emission")?,
-        depth: written.texture("depth")?,
+        depth,
     })
 }
 

@@ -214,6 +214,43 @@ fn draws_are_planned_after_what_they_draw_over() {
     );
 }
 
+/// Depth that is compared and not changed is read, however many passes do so.
+#[test]
+fn depth_that_no_draw_writes_keeps_its_version() {
+    let mut graph = Graph::new();
+    let parts = parts(&mut graph);
+    let tested = RasterState {
+        depth: Some(DepthState {
+            write: false,
+            ..DepthState::REVERSED
+        }),
+        ..RasterState::default()
+    };
+    let filled = graph
+        .clear(parts.depth, ClearValue::Float([0.5; 4]))
+        .unwrap();
+    for name in ["first", "second"] {
+        let colour = graph.texture(name, TextureDesc::d2(64, 48, Format::Rgba16Float));
+        let id = graph.texture(name, TextureDesc::d2(64, 48, Format::R32Uint));
+        let written = graph
+            .raster(name)
+            .colour("colour", colour, CLEAR)
+            .colour("id", id, Load::Clear(ClearValue::Uint([0; 4])))
+            .depth(filled, Load::Keep)
+            .draw(draw(&parts).state(tested.clone()))
+            .finish()
+            .unwrap();
+        assert!(written.texture("depth").is_err());
+        graph
+            .output(name, written.texture("colour").unwrap())
+            .unwrap();
+    }
+    graph.output("depth", filled).unwrap();
+    let plan = plan(&graph).unwrap();
+    assert_eq!(plan.draw_count(), 2);
+    assert!(plan.output("depth").is_some());
+}
+
 #[test]
 fn what_nothing_reads_is_not_drawn() {
     let mut graph = Graph::new();

@@ -5,6 +5,8 @@
 //! that anybody can change, and it may have been made with the limits of
 //! another device.
 
+mod raster;
+
 use etalon_core::backend::BackendError;
 use etalon_core::graph::{ResourceDesc, Subresources};
 use etalon_core::kernel::{BindingKind, Kernel, ViewDimension};
@@ -177,10 +179,7 @@ impl Checker<'_> {
                 self.bindings(step, &kernel.0, bindings)?;
                 self.groups(step, groups)
             }
-            Step::Raster(_) => Err(BackendError::Unsupported {
-                step: step.name.clone(),
-                what: "draws".to_owned(),
-            }),
+            Step::Raster(raster) => self.raster(step, raster),
             Step::ClearTexture {
                 resource, range, ..
             } => {

@@ -1,8 +1,11 @@
 //! A command buffer being recorded.
 //!
-//! Every `vkCmd…` this backend calls is in this file.
+//! Every `vkCmd…` this backend calls is here or, of those that draw, in `draw`.
+
+mod draw;
 
 use ash::vk;
+pub(crate) use draw::{Attachment, Extent};
 use etalon_core::Format;
 use etalon_core::format::SampleKind;
 use etalon_core::graph::{ClearValue, Subresources};
@@ -135,15 +138,20 @@ impl<'a> Commands<'a> {
 
     /// Makes a kernel and what is bound to it current.
     pub(crate) fn bind(&self, pipeline: &Pipeline, set: vk::DescriptorSet, offsets: &[u32]) {
-        let (raw, point) = (&self.device.raw, vk::PipelineBindPoint::COMPUTE);
+        let (raw, point) = (&self.device.raw, pipeline.point);
+        // SAFETY: `new`'s condition; pipelines that draw are made on devices
+        // whose queue does.
+        unsafe { raw.cmd_bind_pipeline(self.raw, point, pipeline.raw) };
+        // Kernels that bind nothing have none.
+        if set == vk::DescriptorSet::null() {
+            return;
+        }
+        let layout = pipeline.layout.raw;
         // SAFETY: `new`'s condition; the set was allocated with the layout that
         // the pipeline was made with, is not updated before this recording has
         // left the GPU, and there is one offset for each uniform block,
         // aligned and within its buffer.
-        unsafe {
-            raw.cmd_bind_pipeline(self.raw, point, pipeline.raw);
-            raw.cmd_bind_descriptor_sets(self.raw, point, pipeline.layout, 0, &[set], offsets);
-        }
+        unsafe { raw.cmd_bind_descriptor_sets(self.raw, point, layout, 0, &[set], offsets) };
     }
 
     /// Runs the current kernel.
@@ -182,11 +190,7 @@ impl<'a> Commands<'a> {
                     raw.cmd_clear_depth_stencil_image(self.raw, image.raw, layout, &value, &ranges);
                 }
                 (_, value) => {
-                    let value = match value {
-                        ClearValue::Float(float32) => vk::ClearColorValue { float32 },
-                        ClearValue::Sint(int32) => vk::ClearColorValue { int32 },
-                        ClearValue::Uint(uint32) => vk::ClearColorValue { uint32 },
-                    };
+                    let value = clear_colour(value);
                     raw.cmd_clear_color_image(self.raw, image.raw, layout, &value, &ranges);
                 }
             }
@@ -314,6 +318,15 @@ impl<'a> Commands<'a> {
                 query,
             );
         }
+    }
+}
+
+/// A colour to fill with.
+fn clear_colour(value: ClearValue) -> vk::ClearColorValue {
+    match value {
+        ClearValue::Float(float32) => vk::ClearColorValue { float32 },
+        ClearValue::Sint(int32) => vk::ClearColorValue { int32 },
+        ClearValue::Uint(uint32) => vk::ClearColorValue { uint32 },
     }
 }
 

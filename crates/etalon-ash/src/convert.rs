@@ -7,6 +7,9 @@ use etalon_core::Format;
 use etalon_core::format::SampleKind;
 use etalon_core::graph::Subresources;
 use etalon_core::kernel::ViewDimension;
+use etalon_core::raster::{
+    Blend, BlendFactor, BlendOperation, ColourWrites, IndexFormat, TargetState, VertexFormat,
+};
 use etalon_core::resource::{
     AddressMode, Compare, Dimension, Filter, LodRange, SamplerDesc, TextureDesc,
 };
@@ -169,7 +172,7 @@ pub(crate) fn sampler(desc: &SamplerDesc) -> vk::SamplerCreateInfo<'static> {
     }
 }
 
-const fn compare_op(compare: Compare) -> vk::CompareOp {
+pub(crate) const fn compare_op(compare: Compare) -> vk::CompareOp {
     match compare {
         Compare::Never => vk::CompareOp::NEVER,
         Compare::Less => vk::CompareOp::LESS,
@@ -179,6 +182,103 @@ const fn compare_op(compare: Compare) -> vk::CompareOp {
         Compare::NotEqual => vk::CompareOp::NOT_EQUAL,
         Compare::GreaterEqual => vk::CompareOp::GREATER_OR_EQUAL,
         Compare::Always => vk::CompareOp::ALWAYS,
+    }
+}
+
+/// How the numbers of a vertex attribute are stored, or `None` for a format
+/// that this backend does not know.
+pub(crate) const fn vertex_format(format: VertexFormat) -> Option<vk::Format> {
+    use VertexFormat as F;
+    use vk::Format as V;
+    Some(match format {
+        F::Float32 => V::R32_SFLOAT,
+        F::Float32x2 => V::R32G32_SFLOAT,
+        F::Float32x3 => V::R32G32B32_SFLOAT,
+        F::Float32x4 => V::R32G32B32A32_SFLOAT,
+        F::Float16x2 => V::R16G16_SFLOAT,
+        F::Float16x4 => V::R16G16B16A16_SFLOAT,
+        F::Unorm8x2 => V::R8G8_UNORM,
+        F::Unorm8x4 => V::R8G8B8A8_UNORM,
+        F::Snorm8x4 => V::R8G8B8A8_SNORM,
+        F::Unorm16x2 => V::R16G16_UNORM,
+        F::Unorm16x4 => V::R16G16B16A16_UNORM,
+        F::Snorm16x2 => V::R16G16_SNORM,
+        F::Snorm16x4 => V::R16G16B16A16_SNORM,
+        F::Uint8x4 => V::R8G8B8A8_UINT,
+        F::Uint16x2 => V::R16G16_UINT,
+        F::Uint16x4 => V::R16G16B16A16_UINT,
+        F::Uint32 => V::R32_UINT,
+        F::Uint32x2 => V::R32G32_UINT,
+        F::Uint32x4 => V::R32G32B32A32_UINT,
+        F::Sint32 => V::R32_SINT,
+        F::Sint32x4 => V::R32G32B32A32_SINT,
+        _ => return None,
+    })
+}
+
+/// How indices are stored.
+pub(crate) const fn index_type(format: IndexFormat) -> vk::IndexType {
+    match format {
+        IndexFormat::Uint16 => vk::IndexType::UINT16,
+        IndexFormat::Uint32 => vk::IndexType::UINT32,
+    }
+}
+
+/// How a draw writes one colour target.
+pub(crate) fn target_state(target: &TargetState) -> vk::PipelineColorBlendAttachmentState {
+    let ColourWrites {
+        red,
+        green,
+        blue,
+        alpha,
+    } = target.writes;
+    let writes = [
+        (red, vk::ColorComponentFlags::R),
+        (green, vk::ColorComponentFlags::G),
+        (blue, vk::ColorComponentFlags::B),
+        (alpha, vk::ColorComponentFlags::A),
+    ]
+    .into_iter()
+    .filter(|(written, _)| *written)
+    .fold(vk::ColorComponentFlags::empty(), |all, (_, flag)| {
+        all | flag
+    });
+    let state = vk::PipelineColorBlendAttachmentState::default().color_write_mask(writes);
+    match &target.blend {
+        None => state,
+        Some(Blend { colour, alpha }) => state
+            .blend_enable(true)
+            .src_color_blend_factor(blend_factor(colour.source))
+            .dst_color_blend_factor(blend_factor(colour.target))
+            .color_blend_op(blend_op(colour.operation))
+            .src_alpha_blend_factor(blend_factor(alpha.source))
+            .dst_alpha_blend_factor(blend_factor(alpha.target))
+            .alpha_blend_op(blend_op(alpha.operation)),
+    }
+}
+
+const fn blend_factor(factor: BlendFactor) -> vk::BlendFactor {
+    match factor {
+        BlendFactor::Zero => vk::BlendFactor::ZERO,
+        BlendFactor::One => vk::BlendFactor::ONE,
+        BlendFactor::Source => vk::BlendFactor::SRC_COLOR,
+        BlendFactor::OneMinusSource => vk::BlendFactor::ONE_MINUS_SRC_COLOR,
+        BlendFactor::SourceAlpha => vk::BlendFactor::SRC_ALPHA,
+        BlendFactor::OneMinusSourceAlpha => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        BlendFactor::Target => vk::BlendFactor::DST_COLOR,
+        BlendFactor::OneMinusTarget => vk::BlendFactor::ONE_MINUS_DST_COLOR,
+        BlendFactor::TargetAlpha => vk::BlendFactor::DST_ALPHA,
+        BlendFactor::OneMinusTargetAlpha => vk::BlendFactor::ONE_MINUS_DST_ALPHA,
+    }
+}
+
+const fn blend_op(operation: BlendOperation) -> vk::BlendOp {
+    match operation {
+        BlendOperation::Add => vk::BlendOp::ADD,
+        BlendOperation::Subtract => vk::BlendOp::SUBTRACT,
+        BlendOperation::ReverseSubtract => vk::BlendOp::REVERSE_SUBTRACT,
+        BlendOperation::Min => vk::BlendOp::MIN,
+        BlendOperation::Max => vk::BlendOp::MAX,
     }
 }
 
@@ -209,6 +309,19 @@ mod tests {
             assert!(
                 seen.insert(vulkan.map(vk::Format::as_raw)),
                 "{known} is given twice"
+            );
+        }
+    }
+
+    #[test]
+    fn every_vertex_format_has_a_distinct_name_in_vulkan() {
+        let mut seen = std::collections::BTreeSet::new();
+        for &known in VertexFormat::ALL {
+            let vulkan = vertex_format(known);
+            assert!(vulkan.is_some(), "{known:?} has no Vulkan format");
+            assert!(
+                seen.insert(vulkan.map(vk::Format::as_raw)),
+                "{known:?} is given twice"
             );
         }
     }

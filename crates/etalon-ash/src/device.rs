@@ -142,13 +142,21 @@ impl Device {
     /// Makes a device of our own.
     pub(crate) fn new(instance: Instance, physical: Physical) -> Result<Self, BackendError> {
         let family = physical
-            .compute_family
+            .family
             .ok_or_else(|| no_device("the device has no queue that computes"))?;
         let features = physical.features;
         let core = vk::PhysicalDeviceFeatures::default()
             .image_cube_array(features.image_cube_array)
             .shader_storage_image_extended_formats(features.storage_image_extended_formats)
-            .shader_storage_image_write_without_format(features.storage_image_write_without_format);
+            .shader_storage_image_write_without_format(features.storage_image_write_without_format)
+            .robust_buffer_access(features.robust_buffer_access)
+            .full_draw_index_uint32(features.full_draw_index_uint32)
+            .independent_blend(features.independent_blend)
+            .depth_bias_clamp(features.depth_bias_clamp)
+            .draw_indirect_first_instance(features.draw_indirect_first_instance)
+            .multi_draw_indirect(features.multi_draw_indirect);
+        let mut robustness2 =
+            vk::PhysicalDeviceRobustness2FeaturesEXT::default().robust_buffer_access2(true);
         let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default()
             .storage_buffer16_bit_access(features.storage_buffer_16bit_access);
         let mut vulkan12 =
@@ -156,7 +164,8 @@ impl Device {
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(features.synchronization2)
             .maintenance4(features.maintenance4)
-            .robust_image_access(features.robust_image_access);
+            .robust_image_access(features.robust_image_access)
+            .dynamic_rendering(features.dynamic_rendering);
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(family)
             .queue_priorities(&[1.0])];
@@ -168,7 +177,7 @@ impl Device {
         }
         .map_err(failed("vkEnumerateDeviceExtensionProperties"))?;
         // A device that has this extension must be made with it.
-        let extensions: Vec<_> = [khr::portability_subset::NAME]
+        let mut extensions: Vec<_> = [khr::portability_subset::NAME]
             .into_iter()
             .filter(|name| {
                 offered
@@ -177,13 +186,19 @@ impl Device {
             })
             .map(CStr::as_ptr)
             .collect();
-        let info = vk::DeviceCreateInfo::default()
+        if features.robust_buffer_access2 {
+            extensions.push(ext::robustness2::NAME.as_ptr());
+        }
+        let mut info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
             .enabled_extension_names(&extensions)
             .enabled_features(&core)
             .push_next(&mut vulkan11)
             .push_next(&mut vulkan12)
             .push_next(&mut vulkan13);
+        if features.robust_buffer_access2 {
+            info = info.push_next(&mut robustness2);
+        }
         // SAFETY: the family exists and has a queue, features and extensions
         // are offered, and everything pointed to lives until the call returns.
         let raw = unsafe { instance.raw.create_device(physical.handle, &info, None) }
@@ -375,6 +390,14 @@ impl Device {
                 Remains::Memory(_) => {}
             }
         }
+    }
+
+    /// Whether the queue draws.
+    pub(crate) fn draws(&self) -> bool {
+        usize::try_from(self.queue_family)
+            .ok()
+            .and_then(|family| self.physical.queue_flags.get(family))
+            .is_some_and(|flags| flags.contains(vk::QueueFlags::GRAPHICS))
     }
 
     /// Bits of the queue's timestamps that count; 0 if it takes none.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use etalon_core::backend::BackendError;
+use etalon_core::format::SampleKind;
 use etalon_core::graph::ClearValue;
 use etalon_core::plan::{Plan, Usage, UsageSet};
 use etalon_core::resource::TextureDesc;
@@ -12,6 +13,7 @@ use etalon_core::resource::TextureDesc;
 use crate::commands::{Barriers, Commands, Transition};
 use crate::device::Device;
 use crate::image::{self, Image};
+use crate::usage::Shaders;
 use crate::{convert, usage};
 
 /// One history: what the last frame wrote, and what this one will.
@@ -101,12 +103,18 @@ fn flags(device: &Device, desc: &TextureDesc) -> vk::ImageUsageFlags {
     let plain = UsageSet::from(Usage::Sampled)
         .with(Usage::CopySource)
         .with(Usage::CopyTarget);
-    let all = usage::image_flags(plain.with(Usage::StorageUpdate));
-    if image::check(device, desc, all).is_ok() {
-        all
-    } else {
-        usage::image_flags(plain)
+    let target = match desc.format.sample_kind() {
+        SampleKind::Depth => Usage::DepthTarget,
+        SampleKind::Float | SampleKind::Sint | SampleKind::Uint => Usage::ColourTarget,
+    };
+    let mut all = usage::image_flags(plain);
+    for more in [Usage::StorageUpdate, target] {
+        let with = all | usage::image_flags(more.into());
+        if image::check(device, desc, with).is_ok() {
+            all = with;
+        }
     }
+    all
 }
 
 /// Fills new histories with their initial values and leaves them at rest.
@@ -120,7 +128,7 @@ pub(crate) fn initialise(commands: &Commands<'_>, pairs: &[Pair]) {
     for (image, _) in &fresh {
         let by = Transition {
             // The image is new, but its memory may be second-hand.
-            source: usage::source(UsageSet::EMPTY),
+            source: usage::source(UsageSet::EMPTY, Shaders::Computing),
             target: (written.stages, written.access),
             layouts: (vk::ImageLayout::UNDEFINED, written.layout),
         };

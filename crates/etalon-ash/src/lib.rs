@@ -81,12 +81,15 @@ mod bindings;
 #[allow(unsafe_code)]
 mod buffer;
 mod chains;
+#[allow(unsafe_code)]
 mod check;
 #[allow(unsafe_code)]
 mod commands;
 mod convert;
 #[allow(unsafe_code)]
 mod device;
+#[allow(unsafe_code)]
+mod draws;
 mod engine;
 mod error;
 mod handover;
@@ -98,6 +101,8 @@ mod host;
 mod image;
 #[allow(unsafe_code)]
 mod instance;
+#[allow(unsafe_code)]
+mod layout;
 #[allow(unsafe_code)]
 mod memory;
 #[allow(unsafe_code)]
@@ -112,6 +117,7 @@ mod record;
 mod run;
 #[allow(unsafe_code)]
 mod sets;
+mod stages;
 mod texels;
 mod uniforms;
 mod usage;

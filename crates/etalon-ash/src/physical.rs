@@ -1,6 +1,6 @@
 //! Physical devices: what there is, what it can do, and which to take.
 
-use ash::vk;
+use ash::{ext, vk};
 use etalon_core::backend::BackendError;
 use etalon_core::resource::Limits;
 
@@ -62,6 +62,31 @@ pub struct Features {
     /// `VkPhysicalDeviceVulkan11Features::storageBuffer16BitAccess`, for kernels
     /// whose storage buffers hold `f16`.
     pub storage_buffer_16bit_access: bool,
+    /// `VkPhysicalDeviceVulkan13Features::dynamicRendering`, for plans that draw.
+    pub dynamic_rendering: bool,
+    /// `VkPhysicalDeviceFeatures::robustBufferAccess`, for draws whose vertices
+    /// only the device knows, by indices or by records: where those are out of
+    /// range, vertex kernels are fed zeros, or something else from the buffer.
+    pub robust_buffer_access: bool,
+    /// `VkPhysicalDeviceRobustness2FeaturesEXT::robustBufferAccess2`, of
+    /// `VK_EXT_robustness2`. With it, indices behind the end of their buffer,
+    /// which records of indexed draws may ask for, are zero; without it, the
+    /// records must ask for none.
+    pub robust_buffer_access2: bool,
+    /// `VkPhysicalDeviceFeatures::fullDrawIndexUint32`, for draws with indices
+    /// of 32 bits.
+    pub full_draw_index_uint32: bool,
+    /// `VkPhysicalDeviceFeatures::independentBlend`, for draws that blend or
+    /// mask their colour targets differently.
+    pub independent_blend: bool,
+    /// `VkPhysicalDeviceFeatures::depthBiasClamp`, for depth biases with a clamp.
+    pub depth_bias_clamp: bool,
+    /// `VkPhysicalDeviceFeatures::drawIndirectFirstInstance`, for indirect draws,
+    /// whose records may begin at any instance.
+    pub draw_indirect_first_instance: bool,
+    /// `VkPhysicalDeviceFeatures::multiDrawIndirect`. Without it, each record of
+    /// an indirect draw takes a call of its own.
+    pub multi_draw_indirect: bool,
 }
 
 impl Features {
@@ -87,8 +112,13 @@ pub(crate) struct Physical {
     pub(crate) memory: vk::PhysicalDeviceMemoryProperties,
     /// What the device offers.
     pub(crate) features: Features,
-    /// The first queue family that computes.
-    pub(crate) compute_family: Option<u32>,
+    /// The queue family to make a device with: the first that computes and
+    /// draws, or else the first that computes.
+    pub(crate) family: Option<u32>,
+    /// What the queue families can do.
+    pub(crate) queue_flags: Vec<vk::QueueFlags>,
+    /// Whether `VK_EXT_robustness2` is offered.
+    pub(crate) robustness2: bool,
     /// Bits of a timestamp that count, by queue family.
     pub(crate) timestamp_bits: Vec<u32>,
 }
@@ -103,12 +133,15 @@ impl Physical {
         let memory = unsafe { raw.get_physical_device_memory_properties(handle) };
         // SAFETY: as above.
         let families = unsafe { raw.get_physical_device_queue_family_properties(handle) };
-        let compute_family = families
-            .iter()
-            .position(|family| {
-                family.queue_count > 0 && family.queue_flags.contains(vk::QueueFlags::COMPUTE)
-            })
-            .and_then(|index| u32::try_from(index).ok());
+        let first = |wanted: vk::QueueFlags| {
+            families
+                .iter()
+                .position(|family| family.queue_count > 0 && family.queue_flags.contains(wanted))
+                .and_then(|index| u32::try_from(index).ok())
+        };
+        // A device that draws has a family that does both (Vulkan §5.3).
+        let family = first(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS)
+            .or_else(|| first(vk::QueueFlags::COMPUTE));
         let mut this = Self {
             handle,
             info: DeviceInfo {
@@ -123,13 +156,15 @@ impl Physical {
             max_buffer: 0,
             memory,
             features: Features::default(),
-            compute_family,
+            family,
+            queue_flags: families.iter().map(|family| family.queue_flags).collect(),
+            robustness2: false,
             timestamp_bits: families
                 .iter()
                 .map(|family| family.timestamp_valid_bits)
                 .collect(),
         };
-        if compute_family.is_none() {
+        if family.is_none() {
             this.info.missing.push("a queue that computes".to_owned());
         }
         if basic.api_version < VERSION {
@@ -166,6 +201,19 @@ impl Physical {
         self.info.driver = format!("{name} {info}").trim().to_owned();
         self.max_allocation = maintenance3.max_memory_allocation_size;
         self.max_buffer = maintenance4.max_buffer_size;
+        // SAFETY: as above.
+        let offered = unsafe {
+            instance
+                .raw
+                .enumerate_device_extension_properties(self.handle)
+        };
+        // One that does not answer offers none.
+        self.robustness2 = offered.is_ok_and(|offered| {
+            offered
+                .iter()
+                .any(|extension| extension.extension_name_as_c_str() == Ok(ext::robustness2::NAME))
+        });
+        let mut robustness2 = vk::PhysicalDeviceRobustness2FeaturesEXT::default();
         let mut vulkan11 = vk::PhysicalDeviceVulkan11Features::default();
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
@@ -173,7 +221,10 @@ impl Physical {
             .push_next(&mut vulkan11)
             .push_next(&mut vulkan12)
             .push_next(&mut vulkan13);
-        // SAFETY: as above.
+        if self.robustness2 {
+            features = features.push_next(&mut robustness2);
+        }
+        // SAFETY: as above, and the extension is offered whose structure is there.
         unsafe {
             instance
                 .raw
@@ -190,6 +241,14 @@ impl Physical {
                 == vk::TRUE,
             shader_float16: vulkan12.shader_float16 == vk::TRUE,
             storage_buffer_16bit_access: vulkan11.storage_buffer16_bit_access == vk::TRUE,
+            dynamic_rendering: vulkan13.dynamic_rendering == vk::TRUE,
+            robust_buffer_access: core.robust_buffer_access == vk::TRUE,
+            robust_buffer_access2: robustness2.robust_buffer_access2 == vk::TRUE,
+            full_draw_index_uint32: core.full_draw_index_uint32 == vk::TRUE,
+            independent_blend: core.independent_blend == vk::TRUE,
+            depth_bias_clamp: core.depth_bias_clamp == vk::TRUE,
+            draw_indirect_first_instance: core.draw_indirect_first_instance == vk::TRUE,
+            multi_draw_indirect: core.multi_draw_indirect == vk::TRUE,
         };
     }
 

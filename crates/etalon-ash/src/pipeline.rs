@@ -1,5 +1,7 @@
-//! Compute pipelines, one per kernel, and samplers.
+//! Compute pipelines, one per kernel, what they share with those that draw, and
+//! samplers.
 
+use std::ffi::CString;
 use std::sync::Arc;
 
 use ash::vk;
@@ -13,28 +15,15 @@ use etalon_core::resource::SamplerDesc;
 use crate::convert;
 use crate::device::{Device, Remains, count};
 use crate::error::{failed, unsupported};
+use crate::layout::Layout;
 use crate::physical::Features;
 
-/// A kernel on the device.
+/// A kernel on the device: to be dispatched, or to be drawn with in one state.
 pub(crate) struct Pipeline {
     pub(crate) raw: vk::Pipeline,
-    pub(crate) layout: vk::PipelineLayout,
-    pub(crate) set_layout: vk::DescriptorSetLayout,
-    /// Descriptors of each type that one set takes.
-    pub(crate) pool_sizes: Vec<vk::DescriptorPoolSize>,
+    pub(crate) point: vk::PipelineBindPoint,
+    pub(crate) layout: Arc<Layout>,
     device: Arc<Device>,
-}
-
-/// The descriptor a binding takes. Uniform blocks lie in a ring, so their
-/// place in it is given when the set is bound.
-pub(crate) const fn descriptor_type(kind: &BindingKind) -> vk::DescriptorType {
-    match kind {
-        BindingKind::Uniform(_) => vk::DescriptorType::UNIFORM_BUFFER_DYNAMIC,
-        BindingKind::Texture { .. } => vk::DescriptorType::SAMPLED_IMAGE,
-        BindingKind::StorageTexture { .. } => vk::DescriptorType::STORAGE_IMAGE,
-        BindingKind::StorageBuffer { .. } => vk::DescriptorType::STORAGE_BUFFER,
-        BindingKind::Sampler { .. } => vk::DescriptorType::SAMPLER,
-    }
 }
 
 /// Refuses a kernel that the device cannot run.
@@ -206,123 +195,127 @@ fn spirv_options() -> SpirvOptions {
     SpirvOptions::default()
 }
 
+/// A stage of a kernel that `check` has let pass, as SPIR-V.
+pub(crate) fn translate(
+    kernel: &Kernel,
+    stage: naga::ShaderStage,
+    step: &str,
+) -> Result<Vec<u32>, BackendError> {
+    let words = spirv(kernel, stage, &spirv_options()).map_err(|error| BackendError::Kernel {
+        step: step.to_owned(),
+        error: Box::new(error),
+    })?;
+    Ok(crate::chains::flatten(&words))
+}
+
+/// A shader module while pipelines are made of it.
+pub(crate) struct Module<'a> {
+    device: &'a Device,
+    pub(crate) raw: vk::ShaderModule,
+    name: CString,
+}
+
+impl<'a> Module<'a> {
+    /// A module of what [`translate`] has written.
+    pub(crate) fn new(
+        device: &'a Device,
+        words: &[u32],
+        entry_point: &str,
+    ) -> Result<Self, BackendError> {
+        let name = CString::new(entry_point).map_err(|_| BackendError::Api {
+            call: "vkCreateShaderModule",
+            reason: format!("entry point {entry_point:?} has a NUL in it"),
+        })?;
+        let info = vk::ShaderModuleCreateInfo::default().code(words);
+        // SAFETY: the words are what naga writes for a validated module, with
+        // no capability beyond those `check` has found enabled.
+        let raw = unsafe { device.raw.create_shader_module(&info, None) }
+            .map_err(failed("vkCreateShaderModule"))?;
+        Ok(Self { device, raw, name })
+    }
+
+    /// The module as a stage of a pipeline.
+    pub(crate) fn stage(
+        &self,
+        stage: vk::ShaderStageFlags,
+    ) -> vk::PipelineShaderStageCreateInfo<'_> {
+        vk::PipelineShaderStageCreateInfo::default()
+            .stage(stage)
+            .module(self.raw)
+            .name(&self.name)
+    }
+}
+
+impl Drop for Module<'_> {
+    fn drop(&mut self) {
+        // SAFETY: a pipeline does not need its module once it is made.
+        unsafe { self.device.raw.destroy_shader_module(self.raw, None) };
+    }
+}
+
 impl Pipeline {
-    /// Translates a kernel and makes a pipeline of it.
+    /// Translates a kernel and makes a pipeline of it, to be dispatched.
     pub(crate) fn new(
         device: &Arc<Device>,
         kernel: &Kernel,
         step: &PlannedStep,
     ) -> Result<Arc<Self>, BackendError> {
         check(device, kernel, &step.name)?;
-        let words =
-            spirv(kernel, naga::ShaderStage::Compute, &spirv_options()).map_err(|error| {
-                BackendError::Kernel {
-                    step: step.name.clone(),
-                    error: Box::new(error),
-                }
-            })?;
-        let words = crate::chains::flatten(&words);
+        let words = translate(kernel, naga::ShaderStage::Compute, &step.name)?;
         count(&device.tally.kernels, 1);
-        let entries: Vec<_> = kernel
-            .bindings
-            .iter()
-            .map(|binding| {
-                vk::DescriptorSetLayoutBinding::default()
-                    .binding(binding.binding)
-                    .descriptor_type(descriptor_type(&binding.kind))
-                    .descriptor_count(1)
-                    .stage_flags(vk::ShaderStageFlags::COMPUTE)
-            })
-            .collect();
-        // From here on dropping it destroys what it has so far.
-        let mut this = Self {
-            raw: vk::Pipeline::null(),
-            layout: vk::PipelineLayout::null(),
-            set_layout: vk::DescriptorSetLayout::null(),
-            pool_sizes: pool_sizes(kernel),
-            device: device.clone(),
-        };
-        let raw = &device.raw;
-        let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&entries);
-        // SAFETY: binding numbers are unique within a kernel, and counts are
-        // within the device's limits, which `check` has checked.
-        this.set_layout = unsafe { raw.create_descriptor_set_layout(&info, None) }
-            .map_err(failed("vkCreateDescriptorSetLayout"))?;
-        let layouts = [this.set_layout];
-        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts);
-        // SAFETY: the set layout was made above.
-        this.layout = unsafe { raw.create_pipeline_layout(&info, None) }
-            .map_err(failed("vkCreatePipelineLayout"))?;
-        this.raw = this.compile(kernel, &words)?;
-        count(&device.tally.pipelines, 1);
-        device.name(this.raw, &kernel.name);
-        Ok(Arc::new(this))
-    }
-
-    fn compile(&self, kernel: &Kernel, words: &[u32]) -> Result<vk::Pipeline, BackendError> {
-        let raw = &self.device.raw;
-        let info = vk::ShaderModuleCreateInfo::default().code(words);
-        // SAFETY: the words are what naga writes for a validated module, with
-        // no capability beyond those `check` has found enabled.
-        let module = unsafe { raw.create_shader_module(&info, None) }
-            .map_err(failed("vkCreateShaderModule"))?;
+        let layout = Layout::new(device, kernel, vk::ShaderStageFlags::COMPUTE)?;
         let entry_point = kernel.compute().map_or("main", |stage| &stage.entry_point);
-        let name: Vec<u8> = entry_point.bytes().chain([0]).collect();
-        let result = match std::ffi::CStr::from_bytes_with_nul(&name) {
-            Ok(name) => {
-                let stage = vk::PipelineShaderStageCreateInfo::default()
-                    .stage(vk::ShaderStageFlags::COMPUTE)
-                    .module(module)
-                    .name(name);
-                let info = vk::ComputePipelineCreateInfo::default()
-                    .stage(stage)
-                    .layout(self.layout);
-                // SAFETY: module and layout were made for each other from one
-                // kernel, whose workgroup is within the device's limits.
-                unsafe { raw.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) }
-                    .map_err(|(_, result)| failed("vkCreateComputePipelines")(result))
-            }
-            Err(_) => Err(BackendError::Api {
-                call: "vkCreateComputePipelines",
-                reason: format!("entry point {entry_point:?} has a NUL in it"),
-            }),
+        let module = Module::new(device, &words, entry_point)?;
+        let info = vk::ComputePipelineCreateInfo::default()
+            .stage(module.stage(vk::ShaderStageFlags::COMPUTE))
+            .layout(layout.raw);
+        // SAFETY: module and layout were made for each other from one kernel,
+        // whose workgroup is within the device's limits.
+        let made = unsafe {
+            device
+                .raw
+                .create_compute_pipelines(vk::PipelineCache::null(), &[info], None)
         };
-        // SAFETY: a pipeline does not need its module once it is made.
-        unsafe { raw.destroy_shader_module(module, None) };
-        result?.into_iter().next().ok_or_else(|| BackendError::Api {
-            call: "vkCreateComputePipelines",
+        let call = "vkCreateComputePipelines";
+        Self::made(
+            device,
+            kernel,
+            layout,
+            vk::PipelineBindPoint::COMPUTE,
+            call,
+            made,
+        )
+    }
+
+    /// Takes what a call to make one pipeline has returned.
+    pub(crate) fn made(
+        device: &Arc<Device>,
+        kernel: &Kernel,
+        layout: Arc<Layout>,
+        point: vk::PipelineBindPoint,
+        call: &'static str,
+        made: Result<Vec<vk::Pipeline>, (Vec<vk::Pipeline>, vk::Result)>,
+    ) -> Result<Arc<Self>, BackendError> {
+        let made = made.map_err(|(_, result)| failed(call)(result))?;
+        let raw = made.into_iter().next().ok_or_else(|| BackendError::Api {
+            call,
             reason: "no pipeline was returned".to_owned(),
-        })
-    }
-}
-
-fn pool_sizes(kernel: &Kernel) -> Vec<vk::DescriptorPoolSize> {
-    let mut sizes: Vec<vk::DescriptorPoolSize> = Vec::new();
-    for binding in &kernel.bindings {
-        add_pool_size(
-            &mut sizes,
-            vk::DescriptorPoolSize {
-                ty: descriptor_type(&binding.kind),
-                descriptor_count: 1,
-            },
-        );
-    }
-    sizes
-}
-
-/// Adds to the count of a type.
-pub(crate) fn add_pool_size(sizes: &mut Vec<vk::DescriptorPoolSize>, more: vk::DescriptorPoolSize) {
-    match sizes.iter_mut().find(|size| size.ty == more.ty) {
-        Some(size) => size.descriptor_count += more.descriptor_count,
-        None => sizes.push(more),
+        })?;
+        count(&device.tally.pipelines, 1);
+        device.name(raw, &kernel.name);
+        Ok(Arc::new(Self {
+            raw,
+            point,
+            layout,
+            device: device.clone(),
+        }))
     }
 }
 
 impl Drop for Pipeline {
     fn drop(&mut self) {
+        // The layout is a field: it is dropped, and buried, after this.
         self.device.bury(Remains::Pipeline(self.raw));
-        self.device.bury(Remains::PipelineLayout(self.layout));
-        self.device.bury(Remains::SetLayout(self.set_layout));
     }
 }
 

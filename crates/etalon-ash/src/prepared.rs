@@ -13,12 +13,13 @@ use gpu_allocator::MemoryLocation;
 
 use crate::buffer::Buffer;
 use crate::device::Device;
+use crate::draws::{DrawPipelines, Formats};
 use crate::engine::TextureState;
 use crate::heap::Heaps;
 use crate::host::HostSide;
 use crate::image::Image;
 use crate::pipeline::{Pipeline, Sampler};
-use crate::sets::Bindings;
+use crate::sets::{self, Bindings};
 use crate::uniforms::UniformRing;
 use crate::{Resource, check, usage};
 
@@ -26,6 +27,7 @@ use crate::{Resource, check, usage};
 #[derive(Default)]
 pub(crate) struct Shared {
     pipelines: HashMap<KernelId, Arc<Pipeline>>,
+    drawing: DrawPipelines,
     pub(crate) samplers: Samplers,
 }
 
@@ -42,8 +44,8 @@ impl Samplers {
 /// What a plan needs on the device, beside what is given to each run.
 pub(crate) struct Prepared {
     pub(crate) heaps: Heaps,
-    /// By step; `None` for steps that are not dispatches.
-    pub(crate) pipelines: Vec<Option<Arc<Pipeline>>>,
+    /// By dispatch and draw, in the plan's order.
+    pub(crate) pipelines: Vec<Arc<Pipeline>>,
     /// By number in the plan: outputs for which the caller has no texture or
     /// buffer, made when first needed.
     outputs: Vec<Option<Resource>>,
@@ -66,22 +68,29 @@ impl Prepared {
         check::plan(device, plan)?;
         let mut pipelines = Vec::with_capacity(plan.steps.len());
         for step in &plan.steps {
-            let Step::Dispatch {
-                kernel, bindings, ..
-            } = &step.step
-            else {
-                pipelines.push(None);
-                continue;
-            };
-            let pipeline = match shared.pipelines.get(&kernel.0.id) {
-                Some(pipeline) => pipeline.clone(),
-                None => {
-                    let made = Pipeline::new(device, &kernel.0, step)?;
-                    shared.pipelines.insert(kernel.0.id, made.clone());
-                    made
+            match &step.step {
+                Step::Dispatch { kernel, .. } => {
+                    let pipeline = match shared.pipelines.get(&kernel.0.id) {
+                        Some(pipeline) => pipeline.clone(),
+                        None => {
+                            let made = Pipeline::new(device, &kernel.0, step)?;
+                            shared.pipelines.insert(kernel.0.id, made.clone());
+                            made
+                        }
+                    };
+                    pipelines.push(pipeline);
                 }
-            };
-            pipelines.push(Some(pipeline));
+                Step::Raster(raster) => {
+                    let formats = Formats::of(plan, raster);
+                    for draw in &raster.draws {
+                        let drawing = &mut shared.drawing;
+                        pipelines.push(drawing.get(device, draw, &formats, &step.name)?);
+                    }
+                }
+                _ => {}
+            }
+        }
+        for (_, bindings) in sets::uses(plan) {
             for bound in bindings {
                 if let Bound::Sampler(desc) = bound
                     && !shared.samplers.0.contains_key(desc)

@@ -1,5 +1,7 @@
 //! Recording a plan: its steps in order, its barriers as they stand.
 
+mod raster;
+
 use std::sync::Arc;
 
 use ash::vk;
@@ -13,7 +15,9 @@ use crate::error::malformed;
 use crate::image::Image;
 use crate::pipeline::Pipeline;
 use crate::texels::Texels;
+use crate::usage::Shaders;
 use crate::{Resource, usage};
+pub(crate) use raster::is_empty;
 
 /// Where the bytes of one capture go.
 #[derive(Debug)]
@@ -43,9 +47,9 @@ pub(crate) struct Run<'a> {
     pub(crate) resources: &'a [Resource],
     /// By number in the plan: transients with memory of their own.
     pub(crate) apart: &'a [bool],
-    /// By step.
-    pub(crate) pipelines: &'a [Option<Arc<Pipeline>>],
-    /// By step.
+    /// By dispatch and draw, in order.
+    pub(crate) pipelines: &'a [Arc<Pipeline>],
+    /// By dispatch and draw, in order.
     pub(crate) sets: &'a [vk::DescriptorSet],
     /// Where this run's uniform blocks begin in their ring.
     pub(crate) uniforms: u32,
@@ -57,24 +61,36 @@ pub(crate) struct Run<'a> {
 impl Run<'_> {
     /// Records the plan.
     pub(crate) fn record(&self, commands: &Commands<'_>) -> Result<(), BackendError> {
+        let shaders = Shaders::of(self.plan);
         let mut barriers = Barriers::default();
+        if let Some([source, target]) = shaders.leave_rest() {
+            barriers.memory(source, target);
+            commands.barrier(&mut barriers);
+        }
         let mut captured = 0;
         let mut timed = 0;
-        for (index, step) in self.plan.steps.iter().enumerate() {
+        // Of the dispatches and draws.
+        let mut next = 0;
+        for step in &self.plan.steps {
             commands.begin_label(&step.name);
-            self.barriers(commands, &step.barriers, &mut barriers)?;
+            self.barriers(commands, &step.barriers, shaders, &mut barriers)?;
             let result = if let Step::Capture { resource, .. } = &step.step {
                 captured += 1;
                 self.capture(commands, *resource, captured - 1)
             } else {
                 self.timed(commands, &mut timed, || {
-                    self.work(commands, index, &step.step)
+                    self.work(commands, &mut next, &step.step)
                 })
             };
             commands.end_label();
             result?;
         }
-        self.barriers(commands, &self.plan.final_barriers, &mut barriers)
+        self.barriers(commands, &self.plan.final_barriers, shaders, &mut barriers)?;
+        if let Some([source, target]) = shaders.come_to_rest() {
+            barriers.memory(source, target);
+            commands.barrier(&mut barriers);
+        }
+        Ok(())
     }
 
     /// Takes the time before and after.
@@ -121,10 +137,11 @@ impl Run<'_> {
         &self,
         commands: &Commands<'_>,
         planned: &[Barrier],
+        shaders: Shaders,
         barriers: &mut Barriers,
     ) -> Result<(), BackendError> {
         for barrier in planned {
-            let by = self.transition(barrier);
+            let by = self.transition(barrier, shaders);
             match self.get(barrier.resource)? {
                 Resource::Texture(image) => barriers.image(image, barrier.range, by),
                 Resource::Buffer(buffer) => barriers.buffer(buffer, by),
@@ -139,23 +156,36 @@ impl Run<'_> {
     }
 
     /// What a barrier is in Vulkan.
-    fn transition(&self, barrier: &Barrier) -> Transition {
+    fn transition(&self, barrier: &Barrier, shaders: Shaders) -> Transition {
         let index = usize::try_from(barrier.resource).unwrap_or(usize::MAX);
         let own_uses = match (self.apart.get(index), self.plan.resources.get(index)) {
             (Some(true), Some(resource)) => resource.usages,
             _ => UsageSet::EMPTY,
         };
-        transition(barrier, own_uses)
+        transition(barrier, own_uses, shaders)
     }
 
     /// Does what a step does.
-    fn work(&self, commands: &Commands<'_>, index: usize, step: &Step) -> Result<(), BackendError> {
+    fn work(
+        &self,
+        commands: &Commands<'_>,
+        next: &mut usize,
+        step: &Step,
+    ) -> Result<(), BackendError> {
         match step {
             Step::Dispatch {
                 bindings, groups, ..
-            } => self.dispatch(commands, index, bindings, groups),
-            // Captures are told apart before, and draws refused by the check.
-            Step::Raster(_) | Step::Capture { .. } => Ok(()),
+            } => {
+                *next += 1;
+                self.dispatch(commands, *next - 1, bindings, groups)
+            }
+            Step::Raster(raster) => {
+                let first = *next;
+                *next += raster.draws.len();
+                self.raster(commands, first, raster)
+            }
+            // Captures are told apart before.
+            Step::Capture { .. } => Ok(()),
             Step::ClearTexture {
                 resource,
                 range,
@@ -193,10 +223,29 @@ impl Run<'_> {
         if matches!(groups, Groups::Direct(counts) if counts.contains(&0)) {
             return Ok(());
         }
-        let (Some(Some(pipeline)), Some(set)) = (self.pipelines.get(index), self.sets.get(index))
-        else {
-            // Every dispatch was given both when the plan was prepared.
-            return Err(malformed(format!("step {index} was not prepared")));
+        self.bind(commands, index, bindings)?;
+        match groups {
+            Groups::Direct(counts) => commands.dispatch(*counts),
+            Groups::Indirect { buffer, offset } => {
+                commands.dispatch_indirect(self.buffer(*buffer)?, *offset);
+            }
+        }
+        count(&commands.device.tally.dispatches, 1);
+        Ok(())
+    }
+
+    /// Makes the pipeline of a dispatch or draw current, and what it binds.
+    fn bind(
+        &self,
+        commands: &Commands<'_>,
+        index: usize,
+        bindings: &[Bound],
+    ) -> Result<(), BackendError> {
+        let (Some(pipeline), Some(set)) = (self.pipelines.get(index), self.sets.get(index)) else {
+            // Each was given both when the plan was prepared.
+            return Err(malformed(format!(
+                "use {index} of a kernel was not prepared"
+            )));
         };
         // In order of binding number, as the kernel's bindings are.
         let offsets: Vec<u32> = bindings
@@ -207,13 +256,6 @@ impl Run<'_> {
             })
             .collect();
         commands.bind(pipeline, *set, &offsets);
-        match groups {
-            Groups::Direct(counts) => commands.dispatch(*counts),
-            Groups::Indirect { buffer, offset } => {
-                commands.dispatch_indirect(self.buffer(*buffer)?, *offset);
-            }
-        }
-        count(&commands.device.tally.dispatches, 1);
         Ok(())
     }
 
@@ -246,17 +288,17 @@ impl Run<'_> {
 /// memory of its own: the plan says what to wait for before its first use by
 /// naming the uses of those that had its memory before, which here was itself,
 /// in the run before. (An empty set waits for everything.)
-fn transition(barrier: &Barrier, own_uses: UsageSet) -> Transition {
+fn transition(barrier: &Barrier, own_uses: UsageSet, shaders: Shaders) -> Transition {
     let first_use = barrier.layout.is_none() && !barrier.from.is_empty();
     let from = if first_use {
         barrier.from.union(own_uses)
     } else {
         barrier.from
     };
-    let to = usage::row(barrier.to);
+    let to = usage::row_in(barrier.to, shaders);
     let old = barrier.layout.map(|layout| usage::row(layout).layout);
     Transition {
-        source: usage::source(from),
+        source: usage::source(from, shaders),
         target: (to.stages, to.access),
         layouts: (old.unwrap_or(vk::ImageLayout::UNDEFINED), to.layout),
     }
@@ -282,12 +324,15 @@ mod tests {
     #[test]
     fn contents_are_kept_where_the_plan_keeps_them() {
         let kept = barrier(Usage::StorageWrite.into(), Some(Usage::StorageWrite));
-        let by = transition(&kept, UsageSet::EMPTY);
+        let by = transition(&kept, UsageSet::EMPTY, Shaders::Computing);
         let target = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
         assert_eq!(by.layouts, (vk::ImageLayout::GENERAL, target));
-        assert_eq!(by.source, usage::source(Usage::StorageWrite.into()));
+        assert_eq!(
+            by.source,
+            usage::source(Usage::StorageWrite.into(), Shaders::Computing)
+        );
         let lost = barrier(Usage::StorageWrite.into(), None);
-        let by = transition(&lost, UsageSet::EMPTY);
+        let by = transition(&lost, UsageSet::EMPTY, Shaders::Computing);
         assert_eq!(by.layouts, (vk::ImageLayout::UNDEFINED, target));
     }
 
@@ -295,12 +340,19 @@ mod tests {
     fn transients_apart_wait_for_their_own_uses_too() {
         let own: UsageSet = Usage::CopySource.into();
         let former: UsageSet = Usage::Sampled.into();
-        let first = transition(&barrier(former, None), own);
-        assert_eq!(first.source, usage::source(former.union(own)));
+        let first = transition(&barrier(former, None), own, Shaders::Drawing);
+        assert_eq!(
+            first.source,
+            usage::source(former.union(own), Shaders::Drawing)
+        );
         // Everything is enough, and later uses are the plan's business.
-        let all = transition(&barrier(UsageSet::EMPTY, None), own);
-        assert_eq!(all.source, usage::source(UsageSet::EMPTY));
-        let later = transition(&barrier(former, Some(Usage::Sampled)), own);
-        assert_eq!(later.source, usage::source(former));
+        let all = transition(&barrier(UsageSet::EMPTY, None), own, Shaders::Drawing);
+        assert_eq!(all.source, usage::source(UsageSet::EMPTY, Shaders::Drawing));
+        let later = transition(
+            &barrier(former, Some(Usage::Sampled)),
+            own,
+            Shaders::Drawing,
+        );
+        assert_eq!(later.source, usage::source(former, Shaders::Drawing));
     }
 }

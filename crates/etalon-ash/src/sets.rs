@@ -1,7 +1,7 @@
 //! Descriptor sets of a plan.
 //!
-//! A *binding* of a plan is one descriptor set for each of its dispatches, for
-//! one choice of the resources behind the plan's numbers. That choice differs
+//! A *binding* of a plan is one descriptor set for each of its dispatches
+//! and draws, for one choice of the resources behind the plan's numbers. That choice differs
 //! between frames where histories swap and where an engine gives other
 //! textures; each gets a binding of its own, found again by the identities of
 //! the resources, so that a frame like an earlier one writes no descriptor.
@@ -12,14 +12,14 @@ use std::sync::Arc;
 
 use ash::vk;
 use etalon_core::backend::BackendError;
-use etalon_core::kernel::BindingKind;
+use etalon_core::kernel::{BindingKind, Kernel};
 use etalon_core::plan::{Bound, Plan, Step, Usage};
 
 use crate::device::{Device, Remains, count};
 use crate::error::{failed, malformed};
-use crate::pipeline::{self, Pipeline};
+use crate::pipeline::Pipeline;
 use crate::prepared::Samplers;
-use crate::{Resource, convert, usage};
+use crate::{Resource, convert, layout, usage};
 
 /// Bindings kept before old ones are used again: two for histories, times two
 /// for engines that take turns with their textures.
@@ -31,7 +31,8 @@ struct Binding {
     /// The resources' identities.
     key: Vec<u64>,
     pool: vk::DescriptorPool,
-    /// By step of the plan; null for steps that are not dispatches.
+    /// By dispatch and draw of the plan, in order; null for kernels that bind
+    /// nothing.
     sets: Vec<vk::DescriptorSet>,
     /// The recording that used it last.
     last_used: u64,
@@ -52,8 +53,8 @@ pub(crate) struct Bindings {
 /// What descriptor sets are made of.
 pub(crate) struct Parts<'a> {
     pub(crate) plan: &'a Plan,
-    /// By step; `None` for steps that are not dispatches.
-    pub(crate) pipelines: &'a [Option<Arc<Pipeline>>],
+    /// By dispatch and draw, in order.
+    pub(crate) pipelines: &'a [Arc<Pipeline>],
     /// By number in the plan.
     pub(crate) resources: &'a [Resource],
     pub(crate) samplers: &'a Samplers,
@@ -61,7 +62,7 @@ pub(crate) struct Parts<'a> {
 }
 
 impl Bindings {
-    /// The descriptor sets, by step, for a recording with these resources.
+    /// The descriptor sets, by dispatch and draw, for a recording with these resources.
     pub(crate) fn get(
         &mut self,
         device: &Arc<Device>,
@@ -123,16 +124,13 @@ impl Bindings {
 
 impl Binding {
     /// Allocates the sets; nothing is in them yet.
-    fn new(
-        device: &Arc<Device>,
-        pipelines: &[Option<Arc<Pipeline>>],
-    ) -> Result<Self, BackendError> {
+    fn new(device: &Arc<Device>, pipelines: &[Arc<Pipeline>]) -> Result<Self, BackendError> {
         let mut sizes = Vec::new();
         let mut layouts = Vec::new();
-        for pipeline in pipelines.iter().flatten() {
-            layouts.push(pipeline.set_layout);
-            for size in &pipeline.pool_sizes {
-                pipeline::add_pool_size(&mut sizes, *size);
+        for pipeline in pipelines.iter().filter(|pipeline| binds(pipeline)) {
+            layouts.push(pipeline.layout.set);
+            for size in &pipeline.layout.pool_sizes {
+                layout::add_pool_size(&mut sizes, *size);
             }
         }
         let mut this = Self {
@@ -144,7 +142,7 @@ impl Binding {
         };
         let Ok(count_of_sets) = u32::try_from(layouts.len()) else {
             return Err(malformed(
-                "more dispatches than there can be descriptor sets",
+                "more dispatches and draws than there can be descriptor sets",
             ));
         };
         if count_of_sets == 0 {
@@ -165,10 +163,7 @@ impl Binding {
             .map_err(failed("vkAllocateDescriptorSets"))?;
         count(&device.tally.bind_groups, u64::from(count_of_sets));
         let slots = this.sets.iter_mut().zip(pipelines);
-        for ((set, _), new) in slots
-            .filter(|(_, pipeline)| pipeline.is_some())
-            .zip(allocated)
-        {
+        for ((set, _), new) in slots.filter(|(_, pipeline)| binds(pipeline)).zip(allocated) {
             *set = new;
         }
         Ok(this)
@@ -176,24 +171,20 @@ impl Binding {
 
     /// Writes every descriptor.
     fn write(&mut self, parts: &Parts<'_>) -> Result<(), BackendError> {
-        for (step, set) in parts.plan.steps.iter().zip(&self.sets) {
-            if let Step::Dispatch {
-                kernel, bindings, ..
-            } = &step.step
-            {
-                let descriptors: Vec<_> = kernel
-                    .0
-                    .bindings
-                    .iter()
-                    .zip(bindings)
-                    .map(|(binding, bound)| {
-                        Ok((
-                            binding.binding,
-                            pipeline::descriptor_type(&binding.kind),
-                            descriptor(&binding.kind, bound, parts)?,
-                        ))
-                    })
-                    .collect::<Result<_, BackendError>>()?;
+        for ((kernel, bindings), set) in uses(parts.plan).zip(&self.sets) {
+            let descriptors: Vec<_> = kernel
+                .bindings
+                .iter()
+                .zip(bindings)
+                .map(|(binding, bound)| {
+                    Ok((
+                        binding.binding,
+                        layout::descriptor_type(&binding.kind),
+                        descriptor(&binding.kind, bound, parts)?,
+                    ))
+                })
+                .collect::<Result<_, BackendError>>()?;
+            if !descriptors.is_empty() {
                 self.update(*set, &descriptors);
             }
         }
@@ -224,6 +215,29 @@ impl Binding {
         // and samplers live: they are used by the recording to come.
         unsafe { self.device.raw.update_descriptor_sets(&writes, &[]) };
     }
+}
+
+/// Whether a pipeline's kernel binds anything.
+fn binds(pipeline: &Pipeline) -> bool {
+    !pipeline.layout.pool_sizes.is_empty()
+}
+
+/// The kernels that a plan dispatches and draws with, in order, and what each
+/// is given: what pipelines and descriptor sets are counted by.
+pub(crate) fn uses(plan: &Plan) -> impl Iterator<Item = (&Kernel, &[Bound])> {
+    plan.steps.iter().flat_map(|step| {
+        let (dispatch, draws) = match &step.step {
+            Step::Dispatch {
+                kernel, bindings, ..
+            } => (Some((&*kernel.0, &bindings[..])), &[][..]),
+            Step::Raster(raster) => (None, &raster.draws[..]),
+            _ => (None, &[][..]),
+        };
+        let draws = draws
+            .iter()
+            .map(|draw| (&*draw.kernel.0, &draw.bindings[..]));
+        dispatch.into_iter().chain(draws)
+    })
 }
 
 /// What one descriptor refers to.

@@ -1,14 +1,26 @@
 //! What each [`Usage`] is in Vulkan: one table.
 //!
-//! | usage           | stages           | access                              | layout                     |
-//! |-----------------|------------------|-------------------------------------|----------------------------|
-//! | `Sampled`       | `COMPUTE_SHADER` | `SHADER_SAMPLED_READ`               | `SHADER_READ_ONLY_OPTIMAL` |
-//! | `StorageRead`   | `COMPUTE_SHADER` | `SHADER_STORAGE_READ`               | `GENERAL`                  |
-//! | `StorageWrite`  | `COMPUTE_SHADER` | `SHADER_STORAGE_WRITE`              | `GENERAL`                  |
-//! | `StorageUpdate` | `COMPUTE_SHADER` | `SHADER_STORAGE_READ`, `…_WRITE`    | `GENERAL`                  |
-//! | `CopySource`    | `COPY`           | `TRANSFER_READ`                     | `TRANSFER_SRC_OPTIMAL`     |
-//! | `CopyTarget`    | `COPY`, `CLEAR`  | `TRANSFER_WRITE`                    | `TRANSFER_DST_OPTIMAL`     |
-//! | `Indirect`      | `DRAW_INDIRECT`  | `INDIRECT_COMMAND_READ`             | buffers only               |
+//! | usage           | stages                         | access                                    | layout                             |
+//! |-----------------|--------------------------------|-------------------------------------------|------------------------------------|
+//! | `Sampled`       | shaders                        | `SHADER_SAMPLED_READ`                     | `SHADER_READ_ONLY_OPTIMAL`         |
+//! | `StorageRead`   | shaders                        | `SHADER_STORAGE_READ`                     | `GENERAL`                          |
+//! | `StorageWrite`  | `COMPUTE_SHADER`               | `SHADER_STORAGE_WRITE`                    | `GENERAL`                          |
+//! | `StorageUpdate` | `COMPUTE_SHADER`               | `SHADER_STORAGE_READ`, `…_WRITE`          | `GENERAL`                          |
+//! | `CopySource`    | `COPY`                         | `TRANSFER_READ`                           | `TRANSFER_SRC_OPTIMAL`             |
+//! | `CopyTarget`    | `COPY`, `CLEAR`                | `TRANSFER_WRITE`                          | `TRANSFER_DST_OPTIMAL`             |
+//! | `Indirect`      | `DRAW_INDIRECT`                | `INDIRECT_COMMAND_READ`                   | buffers only                       |
+//! | `ColourTarget`  | `COLOR_ATTACHMENT_OUTPUT`      | `COLOR_ATTACHMENT_READ`, `…_WRITE`        | `COLOR_ATTACHMENT_OPTIMAL`         |
+//! | `DepthTarget`   | `EARLY_…`, `LATE_FRAGMENT_TESTS` | `DEPTH_STENCIL_ATTACHMENT_READ`, `…_WRITE` | `DEPTH_STENCIL_ATTACHMENT_OPTIMAL` |
+//! | `Vertices`      | `VERTEX_ATTRIBUTE_INPUT`       | `VERTEX_ATTRIBUTE_READ`                   | buffers only                       |
+//! | `Indices`       | `INDEX_INPUT`                  | `INDEX_READ`                              | buffers only                       |
+//!
+//! A plan does not say which shaders read, so those that may: `COMPUTE_SHADER`
+//! alone in a plan that draws nothing, and [`Shaders::Drawing`] in one that
+//! does. Between runs things rest as compute shaders read them, whatever the
+//! plan, so that plans that do not draw wait for nothing that others draw, and
+//! run on queues that cannot. A plan that draws therefore begins with a barrier
+//! from compute shaders to its vertex and fragment shaders, and ends with one
+//! back; see [`Shaders::leave_rest`].
 //!
 //! A barrier waits for the stages of every usage in `from` and makes what they
 //! *wrote* available; reads need no more than the wait. An empty `from` stands
@@ -16,7 +28,7 @@
 //! A `layout` of `None` lets the contents go: `UNDEFINED`.
 
 use ash::vk;
-use etalon_core::plan::{Usage, UsageSet};
+use etalon_core::plan::{Plan, Step, Usage, UsageSet};
 
 /// One row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,16 +38,84 @@ pub(crate) struct Row {
     pub(crate) layout: vk::ImageLayout,
 }
 
-/// The row of a usage.
+/// Two ends of a barrier of memory: stages and accesses of each.
+pub(crate) type Ends = [(vk::PipelineStageFlags2, vk::AccessFlags2); 2];
+
+/// The shaders that read in a plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shaders {
+    /// Compute shaders: of plans that draw nothing, and of things at rest.
+    Computing,
+    /// Compute, vertex and fragment shaders.
+    Drawing,
+}
+
+/// The shaders of draws.
+const OF_DRAWS: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
+    vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
+        | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw(),
+);
+
+impl Shaders {
+    /// Those of a plan.
+    pub(crate) fn of(plan: &Plan) -> Self {
+        let draws = |step: &Step| matches!(step, Step::Raster(_));
+        if plan.steps.iter().any(|step| draws(&step.step)) {
+            Self::Drawing
+        } else {
+            Self::Computing
+        }
+    }
+
+    fn stages(self) -> vk::PipelineStageFlags2 {
+        match self {
+            Self::Computing => vk::PipelineStageFlags2::COMPUTE_SHADER,
+            Self::Drawing => vk::PipelineStageFlags2::COMPUTE_SHADER | OF_DRAWS,
+        }
+    }
+
+    /// What lets shaders of draws, too, read what is at rest. Its writes are
+    /// available already; what is left is to wait as those do that read it as
+    /// it rests, and to see it.
+    pub(crate) fn leave_rest(self) -> Option<Ends> {
+        let reads = vk::AccessFlags2::SHADER_SAMPLED_READ | vk::AccessFlags2::SHADER_STORAGE_READ;
+        (self == Self::Drawing).then_some([
+            (
+                vk::PipelineStageFlags2::COMPUTE_SHADER,
+                vk::AccessFlags2::NONE,
+            ),
+            (OF_DRAWS, reads),
+        ])
+    }
+
+    /// What makes those who wait for a thing at rest wait for its readers among
+    /// the shaders of draws.
+    pub(crate) fn come_to_rest(self) -> Option<Ends> {
+        (self == Self::Drawing).then_some([
+            (OF_DRAWS, vk::AccessFlags2::NONE),
+            (
+                vk::PipelineStageFlags2::COMPUTE_SHADER,
+                vk::AccessFlags2::NONE,
+            ),
+        ])
+    }
+}
+
+/// The row of a usage outside of plans.
 pub(crate) fn row(usage: Usage) -> Row {
+    row_in(usage, Shaders::Computing)
+}
+
+/// The row of a usage in a plan with these shaders.
+pub(crate) fn row_in(usage: Usage, shaders: Shaders) -> Row {
     use vk::{AccessFlags2 as A, ImageLayout as L, PipelineStageFlags2 as S};
     let (stages, access, layout) = match usage {
         Usage::Sampled => (
-            S::COMPUTE_SHADER,
+            shaders.stages(),
             A::SHADER_SAMPLED_READ,
             L::SHADER_READ_ONLY_OPTIMAL,
         ),
-        Usage::StorageRead => (S::COMPUTE_SHADER, A::SHADER_STORAGE_READ, L::GENERAL),
+        Usage::StorageRead => (shaders.stages(), A::SHADER_STORAGE_READ, L::GENERAL),
         Usage::StorageWrite => (S::COMPUTE_SHADER, A::SHADER_STORAGE_WRITE, L::GENERAL),
         Usage::StorageUpdate => (
             S::COMPUTE_SHADER,
@@ -74,7 +154,10 @@ pub(crate) fn row(usage: Usage) -> Row {
 }
 
 /// The first synchronization scope of a barrier that waits for these usages.
-pub(crate) fn source(from: UsageSet) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+pub(crate) fn source(
+    from: UsageSet,
+    shaders: Shaders,
+) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
     if from.is_empty() {
         return (
             vk::PipelineStageFlags2::ALL_COMMANDS,
@@ -85,7 +168,7 @@ pub(crate) fn source(from: UsageSet) -> (vk::PipelineStageFlags2, vk::AccessFlag
         | vk::AccessFlags2::TRANSFER_WRITE
         | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE
         | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE;
-    from.iter().map(row).fold(
+    from.iter().map(|usage| row_in(usage, shaders)).fold(
         (vk::PipelineStageFlags2::empty(), vk::AccessFlags2::empty()),
         |(stages, access), row| (stages | row.stages, access | (row.access & writes)),
     )
@@ -145,6 +228,8 @@ mod tests {
         Usage::Indices,
     ];
 
+    const BOTH: [Shaders; 2] = [Shaders::Computing, Shaders::Drawing];
+
     #[test]
     fn what_a_plan_takes_for_one_layout_is_one_layout() {
         for a in ALL {
@@ -163,14 +248,18 @@ mod tests {
 
     #[test]
     fn only_writes_are_made_available() {
-        for usage in ALL {
-            let (stages, access) = source(usage.into());
-            assert_eq!(stages, row(usage).stages);
+        for (usage, shaders) in ALL
+            .into_iter()
+            .flat_map(|usage| BOTH.map(|shaders| (usage, shaders)))
+        {
+            let (stages, access) = source(usage.into(), shaders);
+            let row = row_in(usage, shaders);
+            assert_eq!(stages, row.stages);
             assert_eq!(!access.is_empty(), usage.writes(), "{usage:?}");
-            assert!(row(usage).access.contains(access));
+            assert!(row.access.contains(access));
         }
         let both = UsageSet::from(Usage::CopyTarget).with(Usage::StorageUpdate);
-        let (stages, access) = source(both);
+        let (stages, access) = source(both, Shaders::Computing);
         assert!(stages.contains(vk::PipelineStageFlags2::COMPUTE_SHADER));
         assert!(stages.contains(vk::PipelineStageFlags2::CLEAR));
         assert!(access.contains(vk::AccessFlags2::TRANSFER_WRITE));
@@ -179,12 +268,36 @@ mod tests {
 
     #[test]
     fn nothing_to_wait_for_means_everything_before() {
-        assert_eq!(
-            source(UsageSet::EMPTY),
-            (
-                vk::PipelineStageFlags2::ALL_COMMANDS,
-                vk::AccessFlags2::MEMORY_WRITE
-            )
+        for shaders in BOTH {
+            assert_eq!(
+                source(UsageSet::EMPTY, shaders),
+                (
+                    vk::PipelineStageFlags2::ALL_COMMANDS,
+                    vk::AccessFlags2::MEMORY_WRITE
+                )
+            );
+        }
+    }
+
+    /// What is at rest can be read by all shaders of a plan, and whoever takes
+    /// it from rest waits for all of them.
+    #[test]
+    fn shaders_of_draws_meet_the_rest_by_barriers() {
+        assert_eq!(Shaders::Computing.leave_rest(), None);
+        assert_eq!(Shaders::Computing.come_to_rest(), None);
+        let ([before, reads], [after, rest]) = (
+            Shaders::Drawing.leave_rest().unwrap(),
+            Shaders::Drawing.come_to_rest().unwrap(),
         );
+        for usage in [Usage::Sampled, Usage::StorageRead] {
+            let (at_rest, in_plan) = (row(usage), row_in(usage, Shaders::Drawing));
+            assert_eq!(at_rest.layout, in_plan.layout);
+            assert_eq!(at_rest.stages, vk::PipelineStageFlags2::COMPUTE_SHADER);
+            assert_eq!(before.0, at_rest.stages);
+            assert_eq!(before.0 | reads.0, in_plan.stages);
+            assert!(reads.1.contains(in_plan.access));
+            assert_eq!(after.0 | rest.0, in_plan.stages);
+            assert_eq!(rest.0, at_rest.stages);
+        }
     }
 }

@@ -7,6 +7,7 @@
 
 #![allow(dead_code)] // Each test program uses part of it.
 
+pub(crate) mod draw;
 pub(crate) mod engine;
 
 use std::sync::Arc;
@@ -139,7 +140,7 @@ pub(crate) fn reds(image: &ImageData) -> Vec<f32> {
 /// The kernels of the tests, each of which does one thing.
 pub(crate) fn kernels() -> KernelLibrary {
     let mut library = KernelLibrary::new();
-    for (path, source) in KERNELS {
+    for (path, source) in KERNELS.iter().chain(draw::KERNELS) {
         library.add_source(path, source);
     }
     library

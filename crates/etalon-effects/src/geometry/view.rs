@@ -39,24 +39,18 @@ impl View {
     }
 
     /// Turns normals of something in the world into view space: the inverse
-    /// transpose, which keeps them at right angles to what is stretched.
+    /// transpose, which keeps them at right angles to what is stretched, times the
+    /// determinant's magnitude, so that something flattened has the normal of its
+    /// plane.
     pub(super) fn normal_matrix(&self, world: DMat4) -> DMat4 {
         let linear = DMat3::from_mat4(self.view * world);
-        // Of what has no volume any normal will do: none of it is seen.
-        let turned = match linear.determinant() {
-            d if d.is_normal() => linear.inverse().transpose(),
-            _ => linear,
-        };
+        let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
+        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
         // Only the direction counts; of the size of one it stays inside f32.
-        let size = turned
-            .to_cols_array()
-            .into_iter()
-            .map(f64::abs)
-            .fold(0.0, f64::max);
-        DMat4::from_mat3(if size.is_normal() {
-            turned * size.recip()
-        } else {
-            linear
-        })
+        let entries = cofactors.to_cols_array();
+        let size = entries.into_iter().map(f64::abs).fold(0.0, f64::max);
+        let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let scale = if size.is_normal() { sign / size } else { sign };
+        DMat4::from_mat3(cofactors * scale)
     }
 }

@@ -13,7 +13,9 @@ use etalon_core::kernel::{BindingKind, RasterStages};
 use etalon_core::plan::{
     DrawExtent, PlannedDraw, PlannedIndices, PlannedTarget, PlannedVertices, RasterStep,
 };
-use etalon_core::raster::{IndexFormat, NumberKind, StepMode, TargetState, Topology};
+use etalon_core::raster::{
+    IndexFormat, MAX_COLOUR_TARGETS, NumberKind, StepMode, TargetState, Topology,
+};
 use etalon_core::resource::Dimension;
 
 use super::{convert, does_nothing};
@@ -47,11 +49,9 @@ fn targets(checker: &Checker<'_>, step: &RasterStep) -> Result<Vec<Format>, Back
     if count == 0 && step.depth.is_none() {
         return Err(checker.malformed("it has no target"));
     }
-    if count > limits.max_color_attachments as usize {
-        return Err(checker.unsupported(format!(
-            "{count} colour targets (at most {})",
-            limits.max_color_attachments
-        )));
+    let most = (limits.max_color_attachments as usize).min(MAX_COLOUR_TARGETS);
+    if count > most {
+        return Err(checker.unsupported(format!("{count} colour targets (at most {most})")));
     }
     let mut seen = BTreeSet::new();
     let (mut formats, mut bytes) = (Vec::with_capacity(count), 0_u32);

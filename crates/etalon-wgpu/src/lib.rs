@@ -31,8 +31,22 @@
 //! }
 //! ```
 //!
+//! # Draws
+//! Each raster step is a render pass of its own. Records of indirect draws are
+//! drawn one by one or at once, as the device can; for their first instances the
+//! device must have
+//! [`INDIRECT_FIRST_INSTANCE`](wgpu::Features::INDIRECT_FIRST_INSTANCE). A record
+//! that names vertices, indices or instances that are not there draws nothing
+//! where wgpu
+//! [looks at it](wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL); vertices that
+//! indices name and that are not there read as whatever WebGPU lets them.
+//!
+//! WebGPU draws to colours of as many numbers as the target has channels, or
+//! more, and to no 3D textures; other draws are refused.
+//!
 //! # What is kept between frames
-//! Pipelines are kept by kernel. Everything else a plan needs (transient
+//! Pipelines are kept by kernel, those of draws also by their state, vertex
+//! layouts and the formats of targets. Everything else a plan needs (transient
 //! textures by [slot](etalon_core::plan::Placement::slot), uniform buffers,
 //! bind groups) is kept by [`Plan::structure`](etalon_core::plan::Plan::structure)
 //! for the [`PREPARED_PLANS`] most recent plans. A frame whose structure was
@@ -51,8 +65,8 @@
 //! # OpenGL
 //! wgpu's OpenGL has no views of single layers or of part of a texture's mips,
 //! copies from what it can render to only, and binds and copies 3D textures by
-//! their first slice. Steps that would need more are refused; most effects'
-//! kernels run.
+//! their first slice. It has no restart of strips, so that indexed strips are
+//! refused. Steps that would need more are refused; most effects' kernels run.
 //!
 //! # Errors
 //! What a device cannot do is a [`BackendError`](etalon_core::backend::BackendError)

@@ -13,7 +13,7 @@ use etalon_core::kernel::{BindingKind, RasterStages};
 use etalon_core::plan::{
     DrawExtent, PlannedDraw, PlannedIndices, PlannedTarget, PlannedVertices, RasterStep,
 };
-use etalon_core::raster::{IndexFormat, NumberKind, StepMode, TargetState, Topology};
+use etalon_core::raster::{MAX_COLOUR_TARGETS, NumberKind, StepMode, TargetState, Topology};
 use etalon_core::resource::Dimension;
 
 use super::{convert, does_nothing};
@@ -47,11 +47,9 @@ fn targets(checker: &Checker<'_>, step: &RasterStep) -> Result<Vec<Format>, Back
     if count == 0 && step.depth.is_none() {
         return Err(checker.malformed("it has no target"));
     }
-    if count > limits.max_color_attachments as usize {
-        return Err(checker.unsupported(format!(
-            "{count} colour targets (at most {})",
-            limits.max_color_attachments
-        )));
+    let most = (limits.max_color_attachments as usize).min(MAX_COLOUR_TARGETS);
+    if count > most {
+        return Err(checker.unsupported(format!("{count} colour targets (at most {most})")));
     }
     let mut seen = BTreeSet::new();
     let (mut formats, mut bytes) = (Vec::with_capacity(count), 0_u32);
@@ -405,6 +403,9 @@ impl Drawn<'_> {
                 offset,
                 draws,
             } => {
+                if *draws == 0 {
+                    return Ok(());
+                }
                 if !checker.gpu.has(wgpu::DownlevelFlags::INDIRECT_EXECUTION) {
                     return Err(checker.unsupported("indirect draws"));
                 }
@@ -429,10 +430,7 @@ impl Drawn<'_> {
 /// Bytes of a record of an indirect draw.
 const fn record_bytes(draw: &PlannedDraw) -> u64 {
     match draw.indices {
-        Some(PlannedIndices {
-            format: IndexFormat::Uint16 | IndexFormat::Uint32,
-            ..
-        }) => 20,
+        Some(_) => 20,
         None => 16,
     }
 }

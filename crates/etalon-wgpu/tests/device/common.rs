@@ -1,5 +1,7 @@
 //! Devices, kernels and images that the tests share.
 
+use std::cell::RefCell;
+
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError, CapturedData, Execution, Inputs};
 use etalon_core::format::SampleKind;
@@ -37,19 +39,80 @@ impl Route {
     }
 }
 
-/// Whether a missing driver is a failure.
-fn required() -> bool {
+/// Whether something missing is a failure.
+fn required(what: &str) -> bool {
     std::env::var("ETALON_REQUIRE")
-        .is_ok_and(|list| list.split(',').any(|name| name.trim() == "wgpu"))
+        .is_ok_and(|list| list.split(',').any(|name| name.trim() == what))
+}
+
+thread_local! {
+    /// What the validation layer has said on this thread.
+    static COMPLAINTS: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Hears what wgpu logs of the validation layer, on the thread whose call it is
+/// about.
+struct Listener;
+
+impl log::Log for Listener {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn && metadata.target().starts_with("wgpu_hal::vulkan")
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        let message = record.args().to_string();
+        let missing = message.contains("unable to find layer");
+        assert!(!missing || !required("validation"), "{message}");
+        // WGSL's number among the source languages of SPIR-V, with which wgpu
+        // marks what it translates, is newer than some layers.
+        let unknown = message.contains("Invalid source language operand: 10");
+        let error = self.enabled(record.metadata()) && record.level() == log::Level::Error;
+        // What follows a message, one line each, is about it.
+        let more = message.starts_with('\t');
+        if error && !unknown && !more {
+            COMPLAINTS.with_borrow_mut(|complaints| complaints.push(message));
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+/// Begins to listen, on every thread.
+fn listen() {
+    if log::set_logger(&Listener).is_ok() {
+        log::set_max_level(log::LevelFilter::Warn);
+    }
+}
+
+/// Fails if the validation layer has complained on this thread.
+fn assert_silent() {
+    let complaints = COMPLAINTS.take();
+    assert!(
+        complaints.is_empty(),
+        "validation: {}",
+        complaints.join("\n")
+    );
+}
+
+#[test]
+#[should_panic(expected = "planted")]
+fn complaints_of_the_validation_layer_are_heard() {
+    listen();
+    log::error!(target: "wgpu_hal::vulkan::instance", "planted");
+    assert_silent();
 }
 
 /// Opens a device, or says why there is none.
 pub(crate) fn open(route: Route) -> Option<WgpuBackend> {
+    listen();
     match WgpuBackend::new(&route.options()) {
         Ok(backend) => Some(backend),
         Err(error @ BackendError::NoDevice { .. }) => {
             // OpenGL is extra: CI requires one Vulkan driver.
-            assert!(!required() || route == Route::Gl, "{route:?}: {error}");
+            assert!(
+                !required("wgpu") || route == Route::Gl,
+                "{route:?}: {error}"
+            );
             println!("skipped on {route:?}: {error}");
             None
         }
@@ -63,6 +126,7 @@ pub(crate) fn on_vulkan(test: impl Fn(&mut WgpuBackend)) {
         if let Some(mut backend) = open(route) {
             println!("{route:?}: {}", backend.info());
             test(&mut backend);
+            assert_silent();
         }
     }
 }
@@ -73,6 +137,7 @@ pub(crate) fn everywhere(test: impl Fn(Route, &mut WgpuBackend)) {
         if let Some(mut backend) = open(route) {
             println!("{route:?}: {}", backend.info());
             test(route, &mut backend);
+            assert_silent();
         }
     }
 }

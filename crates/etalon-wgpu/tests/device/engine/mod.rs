@@ -1,5 +1,6 @@
 //! An engine's device, textures, encoder and submits.
 
+mod draws;
 mod refused;
 mod steady;
 

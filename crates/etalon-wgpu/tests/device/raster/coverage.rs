@@ -264,3 +264,47 @@ fn mips_and_layers_are_drawn_to_by_themselves() {
         }
     });
 }
+
+/// A mip is drawn from the one above it, in one texture.
+#[test]
+fn mips_are_drawn_from_others_of_the_texture() {
+    let scene = || {
+        let mut scene = Scene::default();
+        let desc = TextureDesc {
+            mips: 3,
+            ..TextureDesc::d2(8, 8, Format::Rgba16Float)
+        };
+        let texture = scene.graph.texture("chain", desc);
+        let value = ClearValue::Float([3.0; 4]);
+        let mut texture = scene.graph.clear(texture, value).unwrap();
+        for mip in 1..3 {
+            let draw = Draw::new("test/twice")
+                .read("source", texture.mip(mip - 1))
+                .elements(0..3);
+            let pass = scene.graph.raster(format!("mip {mip}"));
+            let pass = pass.colour("colour", texture.mip(mip), Load::Keep);
+            texture = pass.draw(draw).finish().unwrap().texture("colour").unwrap();
+        }
+        scene.graph.output("image", texture).unwrap();
+        scene
+    };
+    let mut library = kernels();
+    library.add_source(
+        "test/twice",
+        "@group(0) @binding(0) var source: texture_2d<f32>;
+         @vertex fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+             return vec4f(f32(index & 1u) * 4.0 - 1.0, f32(index >> 1u) * 4.0 - 1.0, 0.0, 1.0);
+         }
+         @fragment fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
+             return 2.0 * textureLoad(source, 2u * vec2u(position.xy), 0);
+         }",
+    );
+    on_routes(&library, scene, |execution| {
+        let image = execution.output("image").unwrap();
+        for (mip, wanted) in [(0, 3.0), (1, 6.0), (2, 12.0)] {
+            for (_, texel) in image.texels(mip) {
+                assert_eq!(texel.to_f32(), [wanted; 4], "mip {mip}");
+            }
+        }
+    });
+}

@@ -141,20 +141,55 @@ fn no_elements_instances_or_records_draw_nothing() {
         let records = scene.words("records", &[6, 1, 0, 0]);
         let corners = scene.floats("corners", &cells());
         let all = || flat(corners, [1.0; 4]);
-        let mut draws = vec![
+        let draws = [
             all(),
             all().elements(6..6),
             all().elements(0..6).instances(3..3),
             // Nothing is read, so that nothing need be there.
             all().elements(99..99),
+            all().indirect(records, 0, 0),
         ];
         let before = backend.counters();
-        if backend.info().api == "vulkan" {
-            draws.push(all().indirect(records, 0, 0));
-        }
         scene.draw(SIZE, Format::Rgba8Unorm, draws);
         let execution = scene.run(backend, &kernels());
         assert_eq!(drawn(&execution), []);
         assert_eq!(backend.counters().dispatches, before.dispatches);
+    });
+}
+
+/// Records and indices that name what is not there neither draw beside it nor
+/// take the device down.
+#[test]
+fn what_records_and_indices_name_need_not_be_there() {
+    let scene = || {
+        let mut scene = Scene::default();
+        let far = 1 << 30;
+        let records = [
+            [6, 1, 6, 0],
+            // Vertices and instances past the end.
+            [6, 1, far, 0],
+            [far, 1, 0, 0],
+            [6, 1, 0, 5],
+            [6, far, 0, 0],
+        ];
+        let records = scene.words("records", records.as_flattened());
+        let draw = draw(&mut scene).indirect(records, 0, 5);
+        scene.draw(SIZE, Format::Rgba16Float, [draw]);
+        scene
+    };
+    on_routes(&library(), scene, |execution| {
+        assert_eq!(drawn(execution), [(1, 0, 0)]);
+    });
+    let scene = || {
+        let mut scene = Scene::default();
+        let indices = scene.words("indices", &[0, 1, 2, 1 << 30, u32::MAX, 1 << 20, 3, 4, 5]);
+        let draw = draw(&mut scene)
+            .indices(indices, 0, IndexFormat::Uint32)
+            .elements(0..9);
+        scene.draw(SIZE, Format::Rgba16Float, [draw]);
+        scene
+    };
+    on_routes(&library(), scene, |execution| {
+        assert!(drawn(execution).contains(&(0, 0, 0)));
     });
 }

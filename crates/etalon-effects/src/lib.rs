@@ -8,6 +8,7 @@
 //! | Effect | What it does | Kernels |
 //! |---|---|---|
 //! | [`geometry`](mod@geometry) | depth, velocity and G-buffer, drawn | `shaders/geometry` |
+//! | [`lighting`](mod@lighting) | lights added up from the G-buffer | `shaders/lighting` |
 //! | [`ssr`](mod@ssr) | screen-space reflection | `shaders/ssr` |
 //! | [`exposure`](mod@exposure) | average luminance and adaptation | `shaders/exposure` |
 //! | [`bloom`](mod@bloom) | glow of bright light | `shaders/bloom` |
@@ -35,6 +36,7 @@ pub mod composite;
 mod error;
 pub mod exposure;
 pub mod geometry;
+pub mod lighting;
 pub mod registry;
 mod scene;
 pub mod ssr;

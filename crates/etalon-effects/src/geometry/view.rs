@@ -49,7 +49,11 @@ impl View {
         // Only the direction counts; of the size of one it stays inside f32.
         let entries = cofactors.to_cols_array();
         let size = entries.into_iter().map(f64::abs).fold(0.0, f64::max);
-        let sign = if linear.determinant() < 0.0 { -1.0 } else { 1.0 };
+        let sign = if linear.determinant() < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
         let scale = if size.is_normal() { sign / size } else { sign };
         DMat4::from_mat3(cofactors * scale)
     }

@@ -9,6 +9,7 @@ use etalon_core::image::{ImageData, ImageError};
 use etalon_core::raster::{IndexFormat, StepMode, VertexAttribute, VertexFormat, VertexLayout};
 use etalon_core::resource::{AddressMode, BufferDesc, SamplerDesc, TextureDesc};
 use etalon_effects::geometry::{Item, Maps, Surface, View};
+use etalon_effects::lighting::PunctualLight;
 use etalon_effects::{CameraParams, DepthRange};
 use glam::{Vec2, Vec3, Vec4};
 
@@ -224,6 +225,25 @@ pub fn view(camera: &Camera, size: FrameSize) -> Result<View, CameraError> {
         view: camera.pose().view_matrix(),
         previous: camera.previous_pose().view_matrix(),
     })
+}
+
+/// The lights of a snapshot, in units of `unit`: lux for directional ones, candela
+/// for the others.
+#[must_use]
+pub fn lights(model: &Model, snapshot: &Snapshot, unit: f32) -> Vec<PunctualLight> {
+    let placed = snapshot.lights.iter();
+    placed
+        .map(|placed| {
+            let light = &model.parts().lights[placed.light];
+            PunctualLight {
+                kind: light.kind,
+                position: placed.position.as_dvec3(),
+                direction: placed.direction.as_dvec3(),
+                power: (Vec3::from(light.colour) * (light.intensity / unit)).min(Vec3::splat(1e6)),
+                reach: light.range,
+            }
+        })
+        .collect()
 }
 
 /// The maps of a material that are drawn, and whether their colours are sRGB.

@@ -1,5 +1,7 @@
 //! Punctual lights: `KHR_lights_punctual`.
 
+pub use etalon_effects::lighting::LightKind;
+
 use super::error::{Check, ModelError, Place};
 
 /// A source of light without extent. A node places it; its direction is the
@@ -16,23 +18,6 @@ pub struct Light {
     pub range: Option<f32>,
     /// Which kind it is.
     pub kind: LightKind,
-}
-
-/// How a light's rays run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum LightKind {
-    /// Parallel, from infinitely far away.
-    Directional,
-    /// From a point into all directions, falling off with the squared distance.
-    Point,
-    /// From a point within a cone.
-    Spot {
-        /// Angle from the axis, in radians, up to which the light is full:
-        /// at least 0 and under `outer`.
-        inner: f32,
-        /// Angle from which on there is none, at most π/2.
-        outer: f32,
-    },
 }
 
 impl Light {

@@ -42,7 +42,7 @@ mod texture;
 
 pub use animation::{Animation, Interpolation, Track, Values};
 pub use derive::{flat_normals, tangents};
-pub use drawable::{Drawable, Imported, view};
+pub use drawable::{Drawable, Imported, lights, view};
 pub use error::{ModelError, Place};
 pub use etalon_effects::geometry::DrawClass;
 pub use light::{Light, LightKind};

@@ -333,6 +333,37 @@ fn plans_that_were_tampered_with_are_refused() {
 }
 
 #[test]
+fn stages_that_do_not_suit_each_other_or_the_device_are_refused() {
+    on_each(|backend| {
+        for (kernel, part) in [
+            ("draw/unsuited", "location 3"),
+            ("draw/too_much", "components of vertices (at most"),
+        ] {
+            let mut graph = Graph::new();
+            let target = graph.texture("target", DESC);
+            let drawn = graph
+                .raster("pass")
+                .colour("colour", target, ZERO)
+                .draw(Draw::new(kernel).elements(0..3))
+                .finish()
+                .unwrap();
+            let texture = drawn.texture("colour").unwrap();
+            graph.output("result", texture).unwrap();
+            let plan = plan(backend, &graph, Capture::Outputs);
+            let error = backend.execute(&plan, &Inputs::new()).unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    BackendError::Kernel { .. } | BackendError::Unsupported { .. }
+                ),
+                "{error}"
+            );
+            assert!(error.to_string().contains(part), "{error}");
+        }
+    });
+}
+
+#[test]
 fn slices_of_volumes_are_refused() {
     on_each(|backend| {
         let mut graph = Graph::new();

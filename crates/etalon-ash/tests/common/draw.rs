@@ -256,6 +256,31 @@ pub(crate) const KERNELS: &[(&str, &str)] = &[
              corners[id.x] = vec4f(corner, 0.5, 1.0);
          }",
     ),
+    // Corners as the vertex kernel itself finds them in a buffer.
+    (
+        "draw/pulled",
+        "@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+         @group(0) @binding(1) var depths: texture_depth_2d;
+         @vertex fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+             return corners[index];
+         }
+         @fragment fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+             return vec4f(textureLoad(depths, vec2u(at.xy), 0), 0.0, 0.0, 1.0);
+         }",
+    ),
+    // result = depths
+    (
+        "draw/read_depth",
+        "@group(0) @binding(0) var depths: texture_depth_2d;
+         @group(0) @binding(1) var result: texture_storage_2d<r32float, write>;
+         @compute @workgroup_size(8, 8)
+         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+             let size = textureDimensions(result);
+             if (id.x >= size.x || id.y >= size.y) { return; }
+             let value = textureLoad(depths, id.xy, 0);
+             textureStore(result, id.xy, vec4f(value, 0.0, 0.0, 1.0));
+         }",
+    ),
     // Records of draws, as a compute kernel makes them: one instance of three
     // vertices, from the first on.
     (

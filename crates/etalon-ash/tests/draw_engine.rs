@@ -6,13 +6,15 @@ use ash::vk;
 use common::draw::{Scene, ZERO, corners, quad, state, tinted};
 use common::engine::{DRAWING, Engine, REQUIRED};
 use common::plan;
-use etalon_ash::{AshBackend, AshBindings, AshOptions, Features, TextureState};
+use etalon_ash::{
+    AdoptedBuffer, AshBackend, AshBindings, AshOptions, BufferState, Features, TextureState,
+};
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError};
 use etalon_core::graph::{ClearValue, Draw, Graph, Load};
 use etalon_core::plan::Capture;
 use etalon_core::raster::{Blend, DepthBias, DepthState, IndexFormat, TargetState};
-use etalon_core::resource::TextureDesc;
+use etalon_core::resource::{BufferDesc, TextureDesc};
 
 const SIZE: [u32; 2] = [8, 6];
 const DESC: TextureDesc = TextureDesc::d2(8, 6, Format::R32Float);
@@ -255,6 +257,86 @@ fn plans_that_draw_meet_plans_that_do_not_at_rest() {
         engine.download(commands, images[0].image, DESC, &seen);
         engine.wait(engine.submit(commands));
         assert_eq!(engine.floats(&seen), vec![5.0; 48]);
+    });
+}
+
+/// A buffer that draws read may be written by the next plan.
+#[test]
+fn vertices_and_records_are_written_again_after_they_were_drawn() {
+    let making = |name: &'static str, kernel: &'static str, binding: &'static str, bytes| {
+        let mut graph = Graph::new();
+        let made = graph.buffer(name, BufferDesc { bytes });
+        let made = graph
+            .compute(kernel)
+            .write_buffer(binding, made)
+            .groups([1, 1, 1])
+            .unwrap()
+            .buffer(binding)
+            .unwrap();
+        graph.output_buffer(name, made).unwrap();
+        graph
+    };
+    on_each(DRAWING, |engine, backend| {
+        let mut graph = Graph::new();
+        let mut buffer = |name, bytes| graph.import_buffer(name, BufferDesc { bytes }).unwrap();
+        let (corners_of, records) = (buffer("corners", 96), buffer("records", 16));
+        let target = graph.texture("target", DESC);
+        let drawn = graph
+            .raster("tint")
+            .colour("colour", target, ZERO)
+            .draw(tinted(corners_of, [2.0; 4]).indirect(records, 0, 1))
+            .finish()
+            .unwrap();
+        let texture = drawn.texture("colour").unwrap();
+        graph.output("result", texture).unwrap();
+        let draws = plan(backend, &graph, Capture::None);
+        let makes = [
+            making("corners", "draw/make_corners", "corners", 96),
+            making("records", "draw/make_records", "records", 16),
+        ]
+        .map(|graph| plan(backend, &graph, Capture::None));
+        let lent = [("corners", 96), ("records", 16)].map(|(name, bytes)| {
+            let made = engine.buffer(bytes);
+            let adopted = AdoptedBuffer {
+                buffer: made.buffer,
+                offset: 0,
+                bytes,
+                usage: vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::VERTEX_BUFFER
+                    | vk::BufferUsageFlags::INDIRECT_BUFFER,
+            };
+            // SAFETY: as described, and dropped before the engine.
+            (name, unsafe { backend.adopt_buffer(adopted) }.unwrap())
+        });
+        let rest = BufferState::REST;
+        let commands = engine.begin();
+        let seen = engine.buffer(DESC.bytes().unwrap());
+        for round in 0..3 {
+            for (plan, (name, buffer)) in makes.iter().zip(&lent) {
+                let bindings = AshBindings::new().output_to_buffer(*name, buffer, rest, rest);
+                // SAFETY: the command buffer is being recorded, and the buffers
+                // are at rest.
+                unsafe { backend.record(commands, plan, &bindings) }.unwrap();
+            }
+            let bindings = lent
+                .iter()
+                .fold(AshBindings::new(), |bindings, (name, buffer)| {
+                    bindings.buffer(*name, buffer)
+                });
+            let leaves = if round == 2 {
+                COPIED
+            } else {
+                TextureState::REST
+            };
+            let bindings = bindings.output_in("result", leaves);
+            // SAFETY: as above.
+            let outputs = unsafe { backend.record(commands, &draws, &bindings) }.unwrap();
+            if round == 2 {
+                engine.download(commands, outputs.textures["result"].image, DESC, &seen);
+            }
+        }
+        engine.wait(engine.submit(commands));
+        assert_eq!(engine.floats(&seen), vec![2.0; 48]);
     });
 }
 

@@ -281,12 +281,14 @@ impl Engine {
         }
     }
 
-    /// A buffer for copies and storage that the host sees.
+    /// A buffer for copies, storage and draws that the host sees.
     pub(crate) fn buffer(&self, bytes: u64) -> EngineBuffer {
         let info = vk::BufferCreateInfo::default().size(bytes).usage(
             vk::BufferUsageFlags::TRANSFER_DST
                 | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::STORAGE_BUFFER,
+                | vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::VERTEX_BUFFER
+                | vk::BufferUsageFlags::INDIRECT_BUFFER,
         );
         // SAFETY: the size is not zero.
         let buffer = unsafe { self.device.create_buffer(&info, None) }.unwrap();

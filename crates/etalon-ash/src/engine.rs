@@ -4,7 +4,9 @@
 //! # States
 //! A plan finds imports *at rest* and leaves imports and outputs so: textures in
 //! `SHADER_READ_ONLY_OPTIMAL`, with all writes visible to sampled reads by
-//! compute shaders; buffers visible to storage reads by compute shaders.
+//! compute shaders; buffers visible to storage reads by compute shaders. That
+//! is so of plans that draw as well: they make it visible to their other
+//! shaders themselves, and wait for those before they end.
 //! [`TextureState::REST`] and [`BufferState::REST`] say just that. A binding
 //! in any other state says so, and is taken from there before the first step
 //! and back after the last.

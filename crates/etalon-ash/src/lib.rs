@@ -63,6 +63,18 @@
 //! with [`Backend::memory`](etalon_core::backend::Backend::memory), so that
 //! these are the device's own sizes.
 //!
+//! # Draws
+//! Raster passes are recorded by dynamic rendering, one `vkCmdBeginRendering`
+//! for each, with viewports of negative height: +Y is up in clip space, as in
+//! WebGPU, and a front is what it is there. Pipelines are kept by kernel, vertex
+//! layouts, state and formats of targets; viewport and scissor are dynamic.
+//!
+//! Vertices that indices or records name out of range do no harm, with
+//! `robustBufferAccess`: kernels are fed zeros or something else from the same
+//! buffer, and draws that could name any are refused on a lent device without.
+//! Records of indexed draws must not ask for indices behind the end of their
+//! buffer but on devices with `robustBufferAccess2`. See [`Features`].
+//!
 //! # Unsafe code
 //! Vulkan's calls are in the modules that `lib.rs` allows to make them, each
 //! block with the reason why its conditions hold: wrappers own what they make
@@ -73,6 +85,8 @@
 //! # Devices
 //! Vulkan 1.3 with `synchronization2` and `maintenance4`, which every 1.3
 //! device has, and a queue that computes. [`enumerate`] lists what there is.
+//! Plans that draw also need a queue that does, and `dynamicRendering`; those
+//! that do not are the same without.
 
 #![deny(unsafe_code)]
 

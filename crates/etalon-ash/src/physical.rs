@@ -69,9 +69,9 @@ pub struct Features {
     /// range, vertex kernels are fed zeros, or something else from the buffer.
     pub robust_buffer_access: bool,
     /// `VkPhysicalDeviceRobustness2FeaturesEXT::robustBufferAccess2`, of
-    /// `VK_EXT_robustness2`. With it, indices behind the end of their buffer,
-    /// which records of indexed draws may ask for, are zero; without it, the
-    /// records must ask for none.
+    /// `VK_EXT_robustness2`. With it, records of indexed draws may ask for
+    /// indices behind the end of their buffer; without it, they must not, and
+    /// nobody checks.
     pub robust_buffer_access2: bool,
     /// `VkPhysicalDeviceFeatures::fullDrawIndexUint32`, for draws with indices
     /// of 32 bits.

@@ -89,7 +89,8 @@ impl Shaders {
     }
 
     /// What makes those who wait for a thing at rest wait for its readers among
-    /// the shaders of draws.
+    /// draws. What comes before vertex shaders in a draw, reads of vertices,
+    /// indices and records, is waited for with them (Vulkan 1.3, §7.1.2).
     pub(crate) fn come_to_rest(self) -> Option<Ends> {
         (self == Self::Drawing).then_some([
             (OF_DRAWS, vk::AccessFlags2::NONE),

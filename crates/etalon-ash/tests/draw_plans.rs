@@ -135,6 +135,71 @@ fn a_frame_like_an_earlier_one_makes_nothing() {
     });
 }
 
+/// Vertex kernels read what compute kernels wrote, and depth that was drawn is
+/// read by fragments, by a compute kernel, and drawn to once more.
+#[test]
+fn buffers_and_depth_are_read_by_every_kind_of_shader() {
+    on_each(|backend| {
+        let mut scene = Scene::new();
+        let half = quad(SIZE, [0.0, 0.0], [4.0, 6.0], 0.25);
+        let half = scene.floats("half", &half);
+        let depth = scene.target("depth", SIZE, Format::Depth32Float);
+        let graph = &mut scene.graph;
+        let made = graph.buffer("corners", BufferDesc { bytes: 96 });
+        let made = graph
+            .compute("draw/make_corners")
+            .write_buffer("corners", made)
+            .groups([1, 1, 1])
+            .unwrap()
+            .buffer("corners")
+            .unwrap();
+        let nearer = || state(|state| state.depth = Some(DepthState::REVERSED));
+        let over = Draw::new("draw/depth").vertices(half, 0, corners());
+        let over = over.elements(0..6).state(nearer());
+        let all = Draw::new("draw/depth").vertices(made, 0, corners());
+        let all = all.elements(0..3).state(nearer());
+        let depth = graph.raster("half").depth(depth, ZERO).draw(over);
+        let depth = depth.finish().unwrap().texture("depth").unwrap();
+        let seen = graph.texture("seen", DESC);
+        let seen = graph
+            .raster("see")
+            .colour("colour", seen, ZERO)
+            .draw(
+                Draw::new("draw/pulled")
+                    .read_buffer("corners", made)
+                    .read("depths", depth)
+                    .elements(0..3),
+            )
+            .finish()
+            .unwrap()
+            .texture("colour")
+            .unwrap();
+        let read = |graph: &mut Graph, name: &'static str, depth| {
+            let read = graph.texture(name, DESC);
+            let read = graph
+                .compute("draw/read_depth")
+                .named(name)
+                .read("depths", depth)
+                .write("result", read)
+                .per_texel("result")
+                .unwrap();
+            graph.output(name, read).unwrap();
+        };
+        read(graph, "before", depth);
+        let depth = graph.raster("all").depth(depth, Load::Keep).draw(all);
+        let depth = depth.finish().unwrap().texture("depth").unwrap();
+        read(graph, "after", depth);
+        graph.output("seen", seen).unwrap();
+        for _ in 0..2 {
+            let execution = scene.run(backend);
+            let row = |name: &str| common::reds(execution.output(name).unwrap())[..8].to_vec();
+            let half = [[0.25; 4], [0.0; 4]].concat();
+            assert_eq!((row("seen"), row("before")), (half.clone(), half));
+            assert_eq!(row("after"), [0.5; 8]);
+        }
+    });
+}
+
 /// A history that is drawn to, and read by fragments in the next frame.
 #[test]
 fn histories_are_drawn_to() {
@@ -329,6 +394,37 @@ fn plans_that_were_tampered_with_are_refused() {
         }
         let execution = backend.execute(&good, &scene.inputs()).unwrap();
         assert_eq!(common::reds(execution.output("colour").unwrap()), [1.0; 48]);
+    });
+}
+
+#[test]
+fn stages_that_do_not_suit_each_other_or_the_device_are_refused() {
+    on_each(|backend| {
+        for (kernel, part) in [
+            ("draw/unsuited", "location 3"),
+            ("draw/too_much", "components of vertices (at most"),
+        ] {
+            let mut graph = Graph::new();
+            let target = graph.texture("target", DESC);
+            let drawn = graph
+                .raster("pass")
+                .colour("colour", target, ZERO)
+                .draw(Draw::new(kernel).elements(0..3))
+                .finish()
+                .unwrap();
+            let texture = drawn.texture("colour").unwrap();
+            graph.output("result", texture).unwrap();
+            let plan = plan(backend, &graph, Capture::Outputs);
+            let error = backend.execute(&plan, &Inputs::new()).unwrap_err();
+            assert!(
+                matches!(
+                    error,
+                    BackendError::Kernel { .. } | BackendError::Unsupported { .. }
+                ),
+                "{error}"
+            );
+            assert!(error.to_string().contains(part), "{error}");
+        }
     });
 }
 

@@ -174,6 +174,28 @@ pub(crate) const KERNELS: &[(&str, &str)] = &[
              return textureLoad(source, vec2u(at.xy), 0);
          }",
     ),
+    // Fragments take what vertices do not put out.
+    (
+        "draw/unsuited",
+        "struct Corner { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
+         @vertex fn vertex(@builtin(vertex_index) index: u32) -> Corner {
+             return Corner(vec4f(f32(index)), vec2f());
+         }
+         @fragment fn fragment(@location(3) uv: vec2f) -> @location(0) vec4f {
+             return vec4f(uv, uv);
+         }",
+    ),
+    // More than devices have to pass on.
+    (
+        "draw/too_much",
+        "struct Corner { @builtin(position) clip: vec4f, @location(5000) uv: vec2f }
+         @vertex fn vertex(@builtin(vertex_index) index: u32) -> Corner {
+             return Corner(vec4f(f32(index)), vec2f());
+         }
+         @fragment fn fragment(corner: Corner) -> @location(0) vec4f {
+             return vec4f(corner.uv, corner.uv);
+         }",
+    ),
     // Three targets of different kinds.
     (
         "draw/targets",
@@ -232,6 +254,31 @@ pub(crate) const KERNELS: &[(&str, &str)] = &[
              if (index >= 3u) { index = 6u - index; }
              let corner = vec2f(vec2u(index & 1u, index >> 1u)) * 4.0 - 1.0;
              corners[id.x] = vec4f(corner, 0.5, 1.0);
+         }",
+    ),
+    // Corners as the vertex kernel itself finds them in a buffer.
+    (
+        "draw/pulled",
+        "@group(0) @binding(0) var<storage, read> corners: array<vec4f>;
+         @group(0) @binding(1) var depths: texture_depth_2d;
+         @vertex fn vertex(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
+             return corners[index];
+         }
+         @fragment fn fragment(@builtin(position) at: vec4f) -> @location(0) vec4f {
+             return vec4f(textureLoad(depths, vec2u(at.xy), 0), 0.0, 0.0, 1.0);
+         }",
+    ),
+    // result = depths
+    (
+        "draw/read_depth",
+        "@group(0) @binding(0) var depths: texture_depth_2d;
+         @group(0) @binding(1) var result: texture_storage_2d<r32float, write>;
+         @compute @workgroup_size(8, 8)
+         fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+             let size = textureDimensions(result);
+             if (id.x >= size.x || id.y >= size.y) { return; }
+             let value = textureLoad(depths, id.xy, 0);
+             textureStore(result, id.xy, vec4f(value, 0.0, 0.0, 1.0));
          }",
     ),
     // Records of draws, as a compute kernel makes them: one instance of three

@@ -53,6 +53,38 @@ pub(crate) struct EngineBuffer {
     pub(crate) bytes: u64,
 }
 
+/// The features that every lent device must have.
+pub(crate) const REQUIRED: Features = Features {
+    synchronization2: true,
+    maintenance4: true,
+    robust_image_access: false,
+    image_cube_array: false,
+    storage_image_extended_formats: false,
+    storage_image_write_without_format: false,
+    shader_float16: false,
+    storage_buffer_16bit_access: false,
+    dynamic_rendering: false,
+    robust_buffer_access: false,
+    robust_buffer_access2: false,
+    full_draw_index_uint32: false,
+    independent_blend: false,
+    depth_bias_clamp: false,
+    draw_indirect_first_instance: false,
+    multi_draw_indirect: false,
+};
+
+/// Those, and what draws make use of.
+pub(crate) const DRAWING: Features = Features {
+    dynamic_rendering: true,
+    robust_buffer_access: true,
+    full_draw_index_uint32: true,
+    independent_blend: true,
+    depth_bias_clamp: true,
+    draw_indirect_first_instance: true,
+    multi_draw_indirect: true,
+    ..REQUIRED
+};
+
 /// An instance, a device and a queue.
 pub(crate) struct Engine {
     _entry: ash::Entry,
@@ -62,6 +94,7 @@ pub(crate) struct Engine {
     pub(crate) queue: vk::Queue,
     pub(crate) family: u32,
     pub(crate) pool: vk::CommandPool,
+    features: Features,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     log: Box<Log>,
     images: Mutex<Vec<(vk::Image, vk::DeviceMemory)>>,
@@ -73,6 +106,11 @@ const LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 impl Engine {
     /// An engine on the named device, validated if the layer is installed.
     pub(crate) fn new(name: &str) -> Self {
+        Self::with(name, REQUIRED)
+    }
+
+    /// An engine whose device has these features, of those for draws.
+    pub(crate) fn with(name: &str, features: Features) -> Self {
         // SAFETY: loading the loader has no preconditions.
         let entry = unsafe { ash::Entry::load() }.unwrap();
         // SAFETY: none either.
@@ -89,7 +127,7 @@ impl Engine {
             ext::validation_features::NAME.as_ptr(),
         ];
         let checks = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features =
+        let mut validation =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&checks);
         let messenger_info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
@@ -104,7 +142,7 @@ impl Engine {
             info = info
                 .enabled_layer_names(&layers)
                 .enabled_extension_names(&extensions)
-                .push_next(&mut features);
+                .push_next(&mut validation);
         }
         // SAFETY: layer and extensions are there, and the chain lives.
         let instance = unsafe { entry.create_instance(&info, None) }.unwrap();
@@ -133,14 +171,24 @@ impl Engine {
             .unwrap() as u32;
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
             .synchronization2(true)
-            .maintenance4(true);
+            .maintenance4(true)
+            .dynamic_rendering(features.dynamic_rendering);
+        let core = vk::PhysicalDeviceFeatures::default()
+            .robust_buffer_access(features.robust_buffer_access)
+            .full_draw_index_uint32(features.full_draw_index_uint32)
+            .independent_blend(features.independent_blend)
+            .depth_bias_clamp(features.depth_bias_clamp)
+            .draw_indirect_first_instance(features.draw_indirect_first_instance)
+            .multi_draw_indirect(features.multi_draw_indirect);
         let queues = [vk::DeviceQueueCreateInfo::default()
             .queue_family_index(family)
             .queue_priorities(&[1.0])];
         let info = vk::DeviceCreateInfo::default()
             .queue_create_infos(&queues)
+            .enabled_features(&core)
             .push_next(&mut vulkan13);
-        // SAFETY: the family exists, and every 1.3 device has the features.
+        // SAFETY: the family exists, and the devices that are tested have the
+        // features.
         let device = unsafe { instance.create_device(physical, &info, None) }.unwrap();
         // SAFETY: made with one queue of the family.
         let queue = unsafe { device.get_device_queue(family, 0) };
@@ -155,6 +203,7 @@ impl Engine {
             queue,
             family,
             pool,
+            features,
             messenger,
             log,
             images: Mutex::default(),
@@ -170,11 +219,7 @@ impl Engine {
             device: self.device.clone(),
             queue: self.queue,
             queue_family: self.family,
-            features: Features {
-                synchronization2: true,
-                maintenance4: true,
-                ..Features::default()
-            },
+            features: self.features,
             debug_utils: self.messenger.is_some(),
         }
     }
@@ -236,12 +281,14 @@ impl Engine {
         }
     }
 
-    /// A buffer for copies and storage that the host sees.
+    /// A buffer for copies, storage and draws that the host sees.
     pub(crate) fn buffer(&self, bytes: u64) -> EngineBuffer {
         let info = vk::BufferCreateInfo::default().size(bytes).usage(
             vk::BufferUsageFlags::TRANSFER_DST
                 | vk::BufferUsageFlags::TRANSFER_SRC
-                | vk::BufferUsageFlags::STORAGE_BUFFER,
+                | vk::BufferUsageFlags::STORAGE_BUFFER
+                | vk::BufferUsageFlags::VERTEX_BUFFER
+                | vk::BufferUsageFlags::INDIRECT_BUFFER,
         );
         // SAFETY: the size is not zero.
         let buffer = unsafe { self.device.create_buffer(&info, None) }.unwrap();

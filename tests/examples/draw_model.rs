@@ -87,11 +87,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let picture = chain(&mut graph, &inputs, &ChainSettings::full())?.picture;
     let outputs = [
-        ("picture", picture, Look::default()),
-        ("light", light, Look::default()),
-        ("colour", surfaces.colour, Look::default()),
-        ("normal", surfaces.normal, Look::Signed),
-        ("specular", surfaces.specular, Look::default()),
+        ("picture", picture, Look::Plain),
+        ("light", light, Look::Colour { exposure: 1.0 }),
+        ("colour", surfaces.colour, Look::Colour { exposure: 1.0 }),
+        ("normal", surfaces.normal, Look::Vectors),
+        ("specular", surfaces.specular, Look::Plain),
     ];
     for (name, texture, _) in outputs {
         graph.output(name, texture)?;

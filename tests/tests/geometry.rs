@@ -1,7 +1,7 @@
 //! What is drawn is what exact rays see: depth, normals and velocity of every
 //! model, on every backend.
 
-use etalon::backend::Execution;
+use etalon::backend::{Backend, Execution};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
@@ -48,7 +48,7 @@ fn scenes(size: FrameSize) -> Vec<Scene> {
 }
 
 fn draw(
-    executor: &mut dyn etalon::backend::Backend,
+    executor: &mut dyn Backend,
     scene: &Scene,
     size: FrameSize,
     arithmetic: Arithmetic,
@@ -152,11 +152,16 @@ fn compare(scene: &Scene, size: FrameSize, drawn: &Execution) -> Found {
     found
 }
 
+/// The interpreter does not draw yet.
+fn draws(executor: &dyn Backend) -> bool {
+    executor.info().backend != "cpu"
+}
+
 #[test]
 fn what_is_drawn_is_what_exact_rays_see() {
     let size = FrameSize::new(320, 180).unwrap();
     for scene in &scenes(size) {
-        for executor in &mut executors()[1..] {
+        for executor in executors().iter_mut().filter(|one| draws(one.as_ref())) {
             let drawn = draw(executor.as_mut(), scene, size, Arithmetic::Strict);
             let found = compare(scene, size, &drawn);
             let who = format!("{} on {}: {found:?}", scene.name, executor.info());
@@ -171,8 +176,8 @@ fn what_is_drawn_is_what_exact_rays_see() {
     }
 }
 
-/// The comparison must be able to fail: everything a thousandth of a pixel too
-/// near, and one normal map's bend ignored by none.
+/// The comparison must be able to fail: the camera a centimetre from where rays
+/// start.
 #[test]
 fn a_scene_seen_from_elsewhere_is_found() {
     let size = FrameSize::new(160, 90).unwrap();
@@ -188,7 +193,10 @@ fn a_scene_seen_from_elsewhere_is_found() {
         DVec3::Y,
     );
     let mut executors = executors();
-    let executor = executors[1].as_mut();
+    let Some(executor) = executors.iter_mut().find(|one| draws(one.as_ref())) else {
+        return;
+    };
+    let executor = executor.as_mut();
     let good = compare(
         scene,
         size,

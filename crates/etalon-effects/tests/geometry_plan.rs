@@ -145,7 +145,7 @@ fn every_surface_has_its_kernels() {
         let mut graph = Graph::new();
         let mut one = item(&mut graph, "one", DrawClass::Dynamic);
         let mut map = |bit: u32| -> Option<Texture> {
-            let format = if bit % 2 == 0 {
+            let format = if bit.is_multiple_of(2) {
                 Format::Rgba8UnormSrgb
             } else {
                 Format::Rgba8Unorm

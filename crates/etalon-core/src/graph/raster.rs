@@ -11,7 +11,7 @@ use crate::kernel::KernelRequest;
 use crate::raster::{
     IndexFormat, MAX_COLOUR_TARGETS, RasterState, RasterStateError, Scissor, VertexLayout, Viewport,
 };
-use crate::resource::SamplerDesc;
+use crate::resource::{Dimension, SamplerDesc};
 
 /// What a target holds before the first draw.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -386,6 +386,9 @@ fn targets(
             )));
         };
         let format = desc.format;
+        if desc.dimension == Dimension::D3 {
+            return Err(refuse(format!("`{name}` is a 3D texture; targets are 2D")));
+        }
         if (range.mips, range.layers) != (1, 1) {
             return Err(refuse(format!(
                 "`{name}` is {} mips and {} layers; a target is one of each",

@@ -127,7 +127,10 @@ pub fn prepass(
         .elements(0..3)
         .read("depth", depth)
         .read("drawn", drawn)
-        .set("to_previous", geometry.view.to_previous().as_mat4())
+        .set(
+            "to_previous",
+            geometry.view.previous_from_current().as_mat4(),
+        )
         .set("projection_scale", camera.scale)
         .set("projection_centre", camera.centre)
         .set("depth_bias_slope", camera.depth_bias_slope())

@@ -34,7 +34,7 @@ impl View {
     }
 
     /// From view space to that of one frame earlier.
-    pub(super) fn to_previous(&self) -> DMat4 {
+    pub(super) fn previous_from_current(&self) -> DMat4 {
         self.previous * self.view.inverse()
     }
 

@@ -5,7 +5,7 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{check, half, image, memory, sample, subgroup, texel_atomic};
+use super::{check, half, image, memory, sample, stage, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::Op;
 use crate::num::Number;
@@ -203,6 +203,8 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::ImageGather { .. } => sample::gather(tier, varying_result),
         Op::ImageAtomic { .. } => Handler::plain::<texel_atomic::ImageAtomic>(),
         Op::ImageQuery { .. } => image::query(tier, varying_result),
+        Op::Derivative { .. } => stage::derivative(tier, varying_result),
+        Op::StageOutput { .. } => Handler::new::<stage::Output>(tier),
         Op::Subgroup { .. } => Handler::plain::<subgroup::Subgroup>(),
         Op::Barrier => Handler::plain::<Barrier>(),
         Op::Check(_) => Handler::plain::<check::CheckStep>(),

@@ -112,6 +112,10 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
                 }
                 _ => {
                     let mut derivatives = [[[0.0; K]; 3]; 2];
+                    let (rest, bias) = match rest {
+                        [derivatives @ .., bias] if sampling.bias => (derivatives, Some(*bias)),
+                        rest => (rest, None),
+                    };
                     let each = rest.chunks(request.axes.clamp(1, 3));
                     for (derivative, slots) in derivatives.iter_mut().zip(each) {
                         for (axis, slot) in derivative.iter_mut().zip(slots) {
@@ -119,7 +123,14 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
                         }
                     }
                     let [along_x, along_y] = &derivatives;
-                    Lod::Each(request.gradient(&place, along_x, along_y))
+                    let mut lods = request.gradient(&place, along_x, along_y);
+                    if let Some(bias) = bias {
+                        let bias: [f32; K] = state.singles(bias, chunk);
+                        for k in 0..K {
+                            lods[k] += bias[k];
+                        }
+                    }
+                    Lod::Each(lods)
                 }
             };
             let channels = request.sample::<I, K>(&place, &lod);

@@ -5,15 +5,16 @@ use std::ops::Range;
 
 use serde::Serialize;
 
+use crate::Format;
 use crate::format::SampleKind;
 use crate::graph::{
     Access, ClearValue, DeclaredDraw, Extent, Graph, Load, Pass, RasterWork, ResourceDesc, Slice,
     Subresources,
 };
-use crate::kernel::{Kernel, KernelLibrary, RasterStages, StageValue};
+use crate::kernel::{Kernel, KernelId, KernelLibrary, RasterStages, StageValue};
 use crate::plan::bind::{Binder, BoundPass, Use, layout_conflict};
 use crate::plan::error::Mismatch;
-use crate::plan::{Bound, KernelRef, PlanError, PlanOptions, Step, Usage};
+use crate::plan::{Bound, KernelRef, Plan, PlanError, PlanOptions, Step, Usage};
 use crate::raster::{
     IndexFormat, NumberKind, RasterState, Scissor, StepMode, VertexAttribute, VertexFormat,
     Viewport,
@@ -41,6 +42,17 @@ pub struct PlannedAttribute {
     pub offset: u32,
 }
 
+/// The elements of a vertex buffer, as a kernel takes them.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct PlannedLayout {
+    /// Bytes from one element to the next.
+    pub stride: u32,
+    /// When the next one is taken.
+    pub step: StepMode,
+    /// The inputs that the kernel has, by location; those it has not are left out.
+    pub attributes: Vec<PlannedAttribute>,
+}
+
 /// A buffer that vertex kernels are fed from.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct PlannedVertices {
@@ -48,12 +60,8 @@ pub struct PlannedVertices {
     pub buffer: u32,
     /// First byte.
     pub offset: u64,
-    /// Bytes from one element to the next.
-    pub stride: u32,
-    /// When the next one is taken.
-    pub step: StepMode,
-    /// The inputs that the kernel has, by location; those it has not are left out.
-    pub attributes: Vec<PlannedAttribute>,
+    /// What its elements are.
+    pub layout: PlannedLayout,
 }
 
 /// A buffer of indices.
@@ -122,6 +130,45 @@ pub struct RasterStep {
     pub scissor: Scissor,
     /// The draws, in order.
     pub draws: Vec<PlannedDraw>,
+}
+
+/// Everything about a draw that makes a pipeline: draws of one form can share it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct DrawForm {
+    /// The kernel.
+    pub kernel: KernelId,
+    /// Culling, depth and blending.
+    pub state: RasterState,
+    /// What the vertex kernel is fed from.
+    pub vertices: Vec<PlannedLayout>,
+    /// Formats of the colour targets, by location.
+    pub colours: Vec<Format>,
+    /// The format of the depth target.
+    pub depth: Option<Format>,
+}
+
+impl DrawForm {
+    /// The form of a draw of a plan's step; `None` if a target is no texture,
+    /// which planning makes none of.
+    #[must_use]
+    pub fn new(plan: &Plan, step: &RasterStep, draw: &PlannedDraw) -> Option<Self> {
+        let format =
+            |target: &PlannedTarget| match plan.resources.get(target.resource as usize)?.desc {
+                ResourceDesc::Texture(desc) => Some(desc.format),
+                ResourceDesc::Buffer(_) => None,
+            };
+        let vertices = draw.vertices.iter();
+        Some(Self {
+            kernel: draw.kernel.0.id,
+            state: draw.state.clone(),
+            vertices: vertices.map(|vertices| vertices.layout.clone()).collect(),
+            colours: step.colours.iter().map(format).collect::<Option<_>>()?,
+            depth: match &step.depth {
+                Some(target) => Some(format(target)?),
+                None => None,
+            },
+        })
+    }
 }
 
 impl RasterStep {
@@ -452,9 +499,11 @@ impl Drawn<'_> {
             planned.push(PlannedVertices {
                 buffer,
                 offset: source.slice.offset,
-                stride: layout.stride,
-                step: layout.step,
-                attributes,
+                layout: PlannedLayout {
+                    stride: layout.stride,
+                    step: layout.step,
+                    attributes,
+                },
             });
         }
         Ok(planned)

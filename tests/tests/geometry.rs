@@ -1,7 +1,7 @@
 //! What is drawn is what exact rays see: depth, normals and velocity of every
 //! model, on every backend.
 
-use etalon::backend::{Backend, Execution};
+use etalon::backend::{Backend, BackendError, Execution};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
@@ -10,7 +10,7 @@ use etalon::plan::Capture;
 use etalon_scenes::model::{AlphaMode, Drawable, Model, Snapshot, view};
 use etalon_scenes::trace::{SurfacePoint, TriangleScene, Truth, TruthOptions};
 use etalon_scenes::{Camera, FrameSize, Pose, models};
-use etalon_tests::{executors, plan_for};
+use etalon_tests::{cpu, drawing_executors, plan_for};
 use glam::{DVec2, DVec3, DVec4};
 
 /// A model at a time, as rays see what of it is opaque.
@@ -51,8 +51,7 @@ fn draw(
     executor: &mut dyn Backend,
     scene: &Scene,
     size: FrameSize,
-    arithmetic: Arithmetic,
-) -> Execution {
+) -> Result<Execution, BackendError> {
     let drawable = Drawable::new(&scene.model).unwrap();
     let mut graph = Graph::new();
     let items = drawable.import(&mut graph).unwrap();
@@ -73,8 +72,15 @@ fn draw(
         graph.output(name, texture).unwrap();
     }
     let kernels = KernelLibrary::new();
-    let plan = plan_for(executor, &graph, &kernels, arithmetic, Capture::Outputs).unwrap();
-    executor.execute(&plan, &drawable.inputs()).unwrap()
+    let plan = plan_for(
+        executor,
+        &graph,
+        &kernels,
+        Arithmetic::Strict,
+        Capture::Outputs,
+    )
+    .unwrap();
+    executor.execute(&plan, &drawable.inputs())
 }
 
 fn texel(image: &ImageData, x: u32, y: u32) -> [f64; 4] {
@@ -152,17 +158,12 @@ fn compare(scene: &Scene, size: FrameSize, drawn: &Execution) -> Found {
     found
 }
 
-/// The interpreter does not draw yet.
-fn draws(executor: &dyn Backend) -> bool {
-    executor.info().backend != "cpu"
-}
-
 #[test]
 fn what_is_drawn_is_what_exact_rays_see() {
     let size = FrameSize::new(320, 180).unwrap();
     for scene in &scenes(size) {
-        for executor in executors().iter_mut().filter(|one| draws(one.as_ref())) {
-            let drawn = draw(executor.as_mut(), scene, size, Arithmetic::Strict);
+        for executor in &mut drawing_executors() {
+            let drawn = draw(executor.as_mut(), scene, size).unwrap();
             let found = compare(scene, size, &drawn);
             let who = format!("{} on {}: {found:?}", scene.name, executor.info());
             println!("{who}");
@@ -192,23 +193,26 @@ fn a_scene_seen_from_elsewhere_is_found() {
         pose.position() + pose.orientation() * DVec3::new(0.0, 0.0, -1.0),
         DVec3::Y,
     );
-    let mut executors = executors();
-    let Some(executor) = executors.iter_mut().find(|one| draws(one.as_ref())) else {
+    let mut executors = drawing_executors();
+    let Some(executor) = executors.first_mut() else {
         return;
     };
     let executor = executor.as_mut();
-    let good = compare(
-        scene,
-        size,
-        &draw(executor, scene, size, Arithmetic::Strict),
-    );
+    let good = compare(scene, size, &draw(executor, scene, size).unwrap());
     let seen = scene.camera;
     let fov = seen.vertical_fov();
     scene.camera = Camera::new(moved.unwrap(), fov)
         .unwrap()
         .moved_from(seen.previous_pose());
-    let drawn = draw(executor, scene, size, Arithmetic::Strict);
+    let drawn = draw(executor, scene, size).unwrap();
     scene.camera = seen;
     let bad = compare(scene, size, &drawn);
     assert!(good.depth <= 4.0 && bad.depth > 40.0, "{good:?}, {bad:?}");
+}
+
+#[test]
+fn the_interpreter_says_that_it_does_not_draw() {
+    let size = FrameSize::new(16, 9).unwrap();
+    let refused = draw(cpu().unwrap().as_mut(), &scenes(size)[0], size);
+    assert!(matches!(refused, Err(BackendError::Unsupported { .. })));
 }

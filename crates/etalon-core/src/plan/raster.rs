@@ -249,7 +249,7 @@ pub(crate) fn bind_raster(
     let mut draws = Vec::with_capacity(work.draws.len());
     for draw in &work.draws {
         let kernel = kernels
-            .get(&draw.kernel, options.arithmetic)
+            .get(&draw.call.kernel, options.arithmetic)
             .map_err(|error| PlanError::Kernel {
                 pass: pass.name.clone(),
                 error: Box::new(error),
@@ -274,7 +274,7 @@ pub(crate) fn bind_raster(
             kernel: work
                 .draws
                 .first()
-                .map_or("", |draw| &draw.kernel.path)
+                .map_or("", |draw| &draw.call.kernel.path)
                 .to_owned(),
             mismatch: Mismatch::Differs {
                 name: name.to_owned(),
@@ -336,7 +336,7 @@ impl Drawn<'_> {
                 "a dispatch: it is a compute kernel",
             ));
         };
-        let (bindings, bound) = binder.bindings(&draw.uniforms, &draw.samplers, uniforms)?;
+        let (bindings, bound) = binder.bindings(&draw.call, uniforms)?;
         uses.extend(bound);
         let mut state = draw.state.clone();
         state.targets.resize(self.targets.len(), Default::default());

@@ -6,103 +6,16 @@ use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 use ash::vk;
-use etalon_core::Format;
 use etalon_core::backend::BackendError;
-use etalon_core::graph::ResourceDesc;
 use etalon_core::kernel::{Kernel, KernelId};
-use etalon_core::plan::{Plan, PlannedAttribute, PlannedDraw, PlannedTarget, RasterStep};
-use etalon_core::raster::{CullMode, FrontFace, RasterState, StepMode, TargetState, Topology};
-use etalon_core::resource::Compare;
+use etalon_core::plan::{DrawForm, PlannedAttribute, PlannedLayout};
+use etalon_core::raster::{CullMode, FrontFace, RasterState, StepMode, Topology};
 
 use crate::convert;
 use crate::device::{Device, count};
 use crate::error::malformed;
 use crate::layout::Layout;
 use crate::pipeline::{Module, Pipeline, check, translate};
-
-/// What a pass draws to.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(crate) struct Formats {
-    colours: Vec<Format>,
-    depth: Option<Format>,
-}
-
-impl Formats {
-    /// The formats of a step's targets, in a plan that has been checked.
-    pub(crate) fn of(plan: &Plan, raster: &RasterStep) -> Self {
-        let format = |target: &PlannedTarget| {
-            let index = usize::try_from(target.resource).ok()?;
-            match plan.resources.get(index)?.desc {
-                ResourceDesc::Texture(desc) => Some(desc.format),
-                ResourceDesc::Buffer(_) => None,
-            }
-        };
-        Self {
-            colours: raster.colours.iter().filter_map(format).collect(),
-            depth: raster.depth.as_ref().and_then(format),
-        }
-    }
-}
-
-/// A depth state; numbers by their bits, so that it can be looked up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct DepthKey {
-    compare: Compare,
-    write: bool,
-    constant: i32,
-    slope: u32,
-    clamp: u32,
-}
-
-/// The elements of a vertex buffer.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct VerticesKey {
-    stride: u32,
-    step: StepMode,
-    attributes: Vec<PlannedAttribute>,
-}
-
-/// Everything that tells one pipeline from another.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Key {
-    kernel: KernelId,
-    vertices: Vec<VerticesKey>,
-    topology: Topology,
-    front: FrontFace,
-    cull: CullMode,
-    depth: Option<DepthKey>,
-    targets: Vec<TargetState>,
-    formats: Formats,
-}
-
-impl Key {
-    fn new(draw: &PlannedDraw, formats: &Formats) -> Self {
-        let state = &draw.state;
-        let vertices = draw.vertices.iter().map(|vertices| VerticesKey {
-            stride: vertices.stride,
-            step: vertices.step,
-            attributes: vertices.attributes.clone(),
-        });
-        Self {
-            kernel: draw.kernel.0.id,
-            vertices: vertices.collect(),
-            topology: state.topology,
-            front: state.front,
-            cull: state.cull,
-            depth: state.depth.map(|depth| DepthKey {
-                compare: depth.compare,
-                write: depth.write,
-                constant: depth.bias.constant,
-                slope: depth.bias.slope.to_bits(),
-                clamp: depth.bias.clamp.to_bits(),
-            }),
-            targets: (0..formats.colours.len())
-                .map(|index| state.target(index))
-                .collect(),
-            formats: formats.clone(),
-        }
-    }
-}
 
 /// A kernel's stages as SPIR-V, and what it binds.
 struct Stages {
@@ -115,29 +28,27 @@ struct Stages {
 #[derive(Default)]
 pub(crate) struct DrawPipelines {
     stages: HashMap<KernelId, Stages>,
-    pipelines: HashMap<Key, Arc<Pipeline>>,
+    pipelines: HashMap<DrawForm, Arc<Pipeline>>,
 }
 
 impl DrawPipelines {
-    /// The pipeline of a draw in a plan that has been checked.
+    /// The pipeline for draws of a form, with the form's kernel.
     pub(crate) fn get(
         &mut self,
         device: &Arc<Device>,
-        draw: &PlannedDraw,
-        formats: &Formats,
+        kernel: &Kernel,
+        form: DrawForm,
         step: &str,
     ) -> Result<Arc<Pipeline>, BackendError> {
-        let key = Key::new(draw, formats);
-        if let Some(pipeline) = self.pipelines.get(&key) {
+        if let Some(pipeline) = self.pipelines.get(&form) {
             return Ok(pipeline.clone());
         }
-        let kernel = &draw.kernel.0;
         let stages = match self.stages.entry(kernel.id) {
             Entry::Occupied(found) => found.into_mut(),
             Entry::Vacant(free) => free.insert(Stages::new(device, kernel, step)?),
         };
-        let made = pipeline(device, kernel, stages, &key, &draw.state)?;
-        self.pipelines.insert(key, made.clone());
+        let made = pipeline(device, kernel, stages, &form)?;
+        self.pipelines.insert(form, made.clone());
         Ok(made)
     }
 }
@@ -166,8 +77,7 @@ fn pipeline(
     device: &Arc<Device>,
     kernel: &Kernel,
     stages: &Stages,
-    key: &Key,
-    state: &RasterState,
+    form: &DrawForm,
 ) -> Result<Arc<Pipeline>, BackendError> {
     let names = kernel
         .raster()
@@ -183,11 +93,11 @@ fn pipeline(
             .as_ref()
             .map(|module| module.stage(vk::ShaderStageFlags::FRAGMENT)),
     );
-    let (buffers, attributes) = vertex_input(&key.vertices);
+    let (buffers, attributes) = vertex_input(&form.vertices);
     let vertex_input = vk::PipelineVertexInputStateCreateInfo::default()
         .vertex_binding_descriptions(&buffers)
         .vertex_attribute_descriptions(&attributes);
-    let (topology, strips) = match key.topology {
+    let (topology, strips) = match form.state.topology {
         Topology::TriangleList => (vk::PrimitiveTopology::TRIANGLE_LIST, false),
         Topology::TriangleStrip => (vk::PrimitiveTopology::TRIANGLE_STRIP, true),
     };
@@ -200,26 +110,21 @@ fn pipeline(
         .scissor_count(1);
     let multisample = vk::PipelineMultisampleStateCreateInfo::default()
         .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-    let targets: Vec<_> = key.targets.iter().map(convert::target_state).collect();
+    let targets = (0..form.colours.len()).map(|index| form.state.target(index));
+    let targets: Vec<_> = targets.map(|state| convert::target_state(&state)).collect();
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&targets);
     let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-    let colours: Vec<_> = key
-        .formats
+    let colours: Vec<_> = form
         .colours
         .iter()
         .map(|format| convert::format(*format).unwrap_or_default())
         .collect();
     let mut rendering = vk::PipelineRenderingCreateInfo::default()
         .color_attachment_formats(&colours)
-        .depth_attachment_format(
-            key.formats
-                .depth
-                .and_then(convert::format)
-                .unwrap_or_default(),
-        );
-    let rasterization = rasterization(state);
-    let depth = depth(state);
+        .depth_attachment_format(form.depth.and_then(convert::format).unwrap_or_default());
+    let rasterization = rasterization(&form.state);
+    let depth = depth(&form.state);
     let info = vk::GraphicsPipelineCreateInfo::default()
         .stages(&modules)
         .vertex_input_state(&vertex_input)
@@ -246,7 +151,7 @@ fn pipeline(
 }
 
 fn vertex_input(
-    vertices: &[VerticesKey],
+    vertices: &[PlannedLayout],
 ) -> (
     Vec<vk::VertexInputBindingDescription>,
     Vec<vk::VertexInputAttributeDescription>,

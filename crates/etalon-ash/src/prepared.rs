@@ -7,14 +7,15 @@ use ash::vk;
 use etalon_core::backend::BackendError;
 use etalon_core::graph::ResourceDesc;
 use etalon_core::kernel::KernelId;
-use etalon_core::plan::{Bound, Plan, PlannedResource, ResourceKind, Step};
+use etalon_core::plan::{Bound, DrawForm, Plan, PlannedResource, ResourceKind, Step};
 use etalon_core::resource::SamplerDesc;
 use gpu_allocator::MemoryLocation;
 
 use crate::buffer::Buffer;
 use crate::device::Device;
-use crate::draws::{DrawPipelines, Formats};
+use crate::draws::DrawPipelines;
 use crate::engine::TextureState;
+use crate::error::malformed;
 use crate::heap::Heaps;
 use crate::host::HostSide;
 use crate::image::Image;
@@ -81,10 +82,11 @@ impl Prepared {
                     pipelines.push(pipeline);
                 }
                 Step::Raster(raster) => {
-                    let formats = Formats::of(plan, raster);
                     for draw in &raster.draws {
-                        let drawing = &mut shared.drawing;
-                        pipelines.push(drawing.get(device, draw, &formats, &step.name)?);
+                        let form = DrawForm::new(plan, raster, draw)
+                            .ok_or_else(|| malformed("a target is no texture".to_owned()))?;
+                        let (drawing, kernel) = (&mut shared.drawing, &draw.kernel.0);
+                        pipelines.push(drawing.get(device, kernel, form, &step.name)?);
                     }
                 }
                 _ => {}

@@ -107,7 +107,7 @@ pub struct StepTime {
 pub struct Execution {
     /// What the plan captured, in its order.
     pub captures: Vec<Captured>,
-    /// Times of the dispatches, clears and copies, in the plan's order; empty
+    /// Times of the dispatches, draws, clears and copies, in the plan's order; empty
     /// where the device cannot tell.
     pub times: Vec<StepTime>,
 }
@@ -153,7 +153,7 @@ pub struct Counters {
     pub allocations: u64,
     /// Bytes of device memory held now.
     pub bytes: u64,
-    /// Kernels run.
+    /// Kernels run: dispatches and draws.
     pub dispatches: u64,
     /// Barriers recorded.
     pub barriers: u64,

@@ -2,8 +2,9 @@
 //! environment variable `ETALON_INPUTS` names the folder whose subfolder `exr`
 //! has them, and without it these tests do nothing but say so.
 
-use std::path::PathBuf;
+mod common;
 
+use common::input;
 use etalon_core::format::Format;
 use etalon_core::image::ImageData;
 use etalon_scenes::FrameSize;
@@ -12,25 +13,8 @@ use etalon_scenes::exr_frame::{
 };
 use glam::DVec2;
 
-/// The path of an input, if there are any.
-fn input(name: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("ETALON_INPUTS")
-        .map(|folder| PathBuf::from(folder).join("exr").join(name));
-    match path {
-        Some(path) if path.exists() => Some(path),
-        Some(path) => {
-            println!("skipped: there is no {}", path.display());
-            None
-        }
-        None => {
-            println!("skipped: ETALON_INPUTS is not set");
-            None
-        }
-    }
-}
-
 fn load(name: &str, options: &ExrOptions) -> Option<LoadedFrame> {
-    input(name)
+    input(&format!("exr/{name}"))
         .map(|path| load_exr(&path, options).unwrap_or_else(|error| panic!("{name}: {error}")))
 }
 
@@ -231,7 +215,9 @@ fn truncated_inputs_are_errors() {
         "all-half-values.exr",
         "wide-float-range.exr",
     ] {
-        let Some(path) = input(name) else { return };
+        let Some(path) = input(&format!("exr/{name}")) else {
+            return;
+        };
         let bytes = std::fs::read(path).unwrap();
         for length in (0..bytes.len()).step_by(9973) {
             let result = decode_exr(&bytes[..length], &ExrOptions::default());

@@ -4,31 +4,12 @@
 
 mod common;
 
-use std::path::PathBuf;
-
-use common::size;
+use common::{input, size};
 use etalon_scenes::model::gltf::{GltfOptions, load_gltf};
 use etalon_scenes::model::{DrawClass, Model, Moment, tangents};
 use etalon_scenes::trace::{Faces, TriangleScene, TruthOptions};
 use etalon_scenes::{Camera, Pose};
 use glam::{DVec3, Vec3};
-
-/// The path of an input, if there are any.
-fn input(name: &str) -> Option<PathBuf> {
-    let path = std::env::var_os("ETALON_INPUTS")
-        .map(|folder| PathBuf::from(folder).join("gltf").join(name));
-    match path {
-        Some(path) if path.exists() => Some(path),
-        Some(path) => {
-            println!("skipped: there is no {}", path.display());
-            None
-        }
-        None => {
-            println!("skipped: ETALON_INPUTS is not set");
-            None
-        }
-    }
-}
 
 fn load(path: &std::path::Path) -> Model {
     load_gltf(path, &GltfOptions::default()).unwrap_or_else(|error| panic!("{error}"))
@@ -36,7 +17,7 @@ fn load(path: &std::path::Path) -> Model {
 
 #[test]
 fn the_helmet_has_what_its_accessors_say() {
-    let Some(path) = input("flight-helmet/FlightHelmet.gltf") else {
+    let Some(path) = input("gltf/flight-helmet/FlightHelmet.gltf") else {
         return;
     };
     let model = load(&path);
@@ -92,7 +73,7 @@ fn the_helmet_has_what_its_accessors_say() {
 
 #[test]
 fn tangents_made_here_agree_with_the_helmets_own() {
-    let Some(path) = input("flight-helmet/FlightHelmet.gltf") else {
+    let Some(path) = input("gltf/flight-helmet/FlightHelmet.gltf") else {
         return;
     };
     let model = load(&path);
@@ -116,7 +97,7 @@ fn tangents_made_here_agree_with_the_helmets_own() {
 
 #[test]
 fn rays_see_the_helmet() {
-    let Some(path) = input("flight-helmet/FlightHelmet.gltf") else {
+    let Some(path) = input("gltf/flight-helmet/FlightHelmet.gltf") else {
         return;
     };
     let model = load(&path);
@@ -154,7 +135,7 @@ fn rays_see_the_helmet() {
 
 #[test]
 fn the_fox_has_a_skin_and_three_gaits() {
-    let Some(path) = input("fox/fox.glb") else {
+    let Some(path) = input("gltf/fox/fox.glb") else {
         return;
     };
     let model = load(&path);

@@ -193,8 +193,8 @@ impl Drawn<'_> {
         };
         let device = checker.device;
         pipeline::check(device, kernel, &step.name)?;
-        stages::check(&device.physical.limits, kernel, self.raster.colours.len())
-            .map_err(|refused| refused.in_step(&step.name, kernel))?;
+        let colours = self.raster.colours.len();
+        stages::check(&device.physical.limits, kernel, colours, &step.name)?;
         checker.bindings(step, kernel, &draw.bindings)?;
         self.state()?;
         self.outputs(interface)?;
@@ -293,13 +293,13 @@ impl Drawn<'_> {
         let buffers = self.draw.vertices.len();
         let mut locations = Vec::new();
         for vertices in &self.draw.vertices {
-            if vertices.stride > limits.max_vertex_input_binding_stride {
+            if vertices.layout.stride > limits.max_vertex_input_binding_stride {
                 return self.lacking(format!(
                     "a stride of {} bytes (at most {})",
-                    vertices.stride, limits.max_vertex_input_binding_stride
+                    vertices.layout.stride, limits.max_vertex_input_binding_stride
                 ));
             }
-            for attribute in &vertices.attributes {
+            for attribute in &vertices.layout.attributes {
                 let input = inputs
                     .iter()
                     .find(|input| input.location == attribute.location);
@@ -311,12 +311,12 @@ impl Drawn<'_> {
                 let alignment = attribute.format.bytes().min(4);
                 let end = attribute.offset.checked_add(attribute.format.bytes());
                 if !attribute.offset.is_multiple_of(alignment)
-                    || !vertices.stride.is_multiple_of(4)
-                    || end.is_none_or(|end| end > vertices.stride)
+                    || !vertices.layout.stride.is_multiple_of(4)
+                    || end.is_none_or(|end| end > vertices.layout.stride)
                 {
                     return self.malformed(format!(
                         "{attribute:?} cannot be read in elements of {} bytes",
-                        vertices.stride
+                        vertices.layout.stride
                     ));
                 }
                 if attribute.offset > limits.max_vertex_input_attribute_offset {
@@ -377,13 +377,14 @@ impl Drawn<'_> {
 
     fn vertices(&self, vertices: &PlannedVertices) -> Result<(), BackendError> {
         let tail = vertices
+            .layout
             .attributes
             .iter()
             .map(|attribute| u64::from(attribute.offset) + u64::from(attribute.format.bytes()))
             .max()
             .unwrap_or(0);
         // The last element that the plan knows will be read.
-        let last = match (&self.draw.extent, vertices.step) {
+        let last = match (&self.draw.extent, vertices.layout.step) {
             (DrawExtent::Direct { instances, .. }, StepMode::Instance) => Some(instances.end - 1),
             (DrawExtent::Direct { elements, .. }, StepMode::Vertex)
                 if self.draw.indices.is_none() =>
@@ -393,7 +394,7 @@ impl Drawn<'_> {
             _ => None,
         };
         let end = match last {
-            Some(last) => (u64::from(last) * u64::from(vertices.stride))
+            Some(last) => (u64::from(last) * u64::from(vertices.layout.stride))
                 .checked_add(tail)
                 .and_then(|end| end.checked_add(vertices.offset)),
             None => Some(0),
@@ -401,7 +402,7 @@ impl Drawn<'_> {
         let source = (vertices.buffer, Usage::Vertices);
         self.slice(source, (vertices.offset, 4), end)?;
         let robust = self.checker.device.features.robust_buffer_access;
-        if last.is_none() && !vertices.attributes.is_empty() && !robust {
+        if last.is_none() && !vertices.layout.attributes.is_empty() && !robust {
             return self.lacking(feature(
                 "robustBufferAccess",
                 "draws whose vertices only the device knows",

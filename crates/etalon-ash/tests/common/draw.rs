@@ -174,17 +174,6 @@ pub(crate) const KERNELS: &[(&str, &str)] = &[
              return textureLoad(source, vec2u(at.xy), 0);
          }",
     ),
-    // Fragments take what vertices do not put out.
-    (
-        "draw/unsuited",
-        "struct Corner { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
-         @vertex fn vertex(@builtin(vertex_index) index: u32) -> Corner {
-             return Corner(vec4f(f32(index)), vec2f());
-         }
-         @fragment fn fragment(@location(3) uv: vec2f) -> @location(0) vec4f {
-             return vec4f(uv, uv);
-         }",
-    ),
     // More than devices have to pass on.
     (
         "draw/too_much",

@@ -46,7 +46,7 @@ use serde::Serialize;
 pub use error::GraphError;
 pub(crate) use handle::GraphId;
 pub use handle::{Buffer, Subresources, Texture, TextureView};
-pub(crate) use pass::{Access, AccessKind, Dispatch, Pass, Work};
+pub(crate) use pass::{Access, AccessKind, Dispatch, KernelCall, Pass, Work};
 pub use pass::{ComputePass, Written};
 pub(crate) use raster::{DeclaredDraw, Extent, RasterWork, Slice};
 pub use raster::{Draw, Load, RasterPass};

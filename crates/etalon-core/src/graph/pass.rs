@@ -113,14 +113,64 @@ pub(crate) enum Dispatch {
     Indirect { offset: u64 },
 }
 
+/// A kernel, and what it is given beside resources.
+#[derive(Clone, Debug)]
+pub(crate) struct KernelCall {
+    pub(crate) kernel: KernelRequest,
+    pub(crate) uniforms: Vec<(Cow<'static, str>, UniformValue)>,
+    pub(crate) samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
+}
+
+impl KernelCall {
+    pub(crate) fn new(path: impl Into<Cow<'static, str>>) -> Self {
+        Self {
+            kernel: KernelRequest::new(path),
+            uniforms: Vec::new(),
+            samplers: Vec::new(),
+        }
+    }
+
+    /// The call in the one form that equal ones share: a request's identity must
+    /// not depend on the order of the calls that made it.
+    pub(crate) fn settled(mut self, pass: &str) -> Result<Self, GraphError> {
+        if let Some(name) = self.repeated() {
+            return Err(GraphError::GivenTwice {
+                pass: pass.to_owned(),
+                name,
+            });
+        }
+        self.kernel.constants.sort_by(|a, b| a.0.cmp(&b.0));
+        self.kernel.features.sort_by(|a, b| a.0.cmp(&b.0));
+        Ok(self)
+    }
+
+    /// The first name of a uniform member, constant, feature or sampler that is
+    /// given twice.
+    fn repeated(&self) -> Option<String> {
+        fn names<'n, T>(named: &'n [(Cow<'static, str>, T)]) -> Vec<&'n str> {
+            named.iter().map(|(name, _)| name.as_ref()).collect()
+        }
+        [
+            names(&self.uniforms),
+            names(&self.kernel.constants),
+            names(&self.kernel.features),
+            names(&self.samplers),
+        ]
+        .into_iter()
+        .find_map(|mut names| {
+            names.sort_unstable();
+            let pair = names.windows(2).find(|pair| pair[0] == pair[1])?;
+            Some(pair[0].to_owned())
+        })
+    }
+}
+
 /// What a pass does.
 #[derive(Clone, Debug)]
 pub(crate) enum Work {
     Compute {
-        kernel: KernelRequest,
+        call: KernelCall,
         dispatch: Dispatch,
-        uniforms: Vec<(Cow<'static, str>, UniformValue)>,
-        samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
     },
     Raster(RasterWork),
     ClearTexture(ClearValue),
@@ -265,30 +315,6 @@ pub(crate) fn check(
     Ok(range)
 }
 
-/// The first name that is given twice to a kernel: of a constant, a feature, a
-/// uniform member or a sampler.
-pub(crate) fn repeated(
-    kernel: &KernelRequest,
-    uniforms: &[(Cow<'static, str>, UniformValue)],
-    samplers: &[(Cow<'static, str>, SamplerDesc)],
-) -> Option<String> {
-    fn names<'n, T>(named: &'n [(Cow<'static, str>, T)]) -> Vec<&'n str> {
-        named.iter().map(|(name, _)| name.as_ref()).collect()
-    }
-    [
-        names(uniforms),
-        names(&kernel.constants),
-        names(&kernel.features),
-        names(samplers),
-    ]
-    .into_iter()
-    .find_map(|mut names| {
-        names.sort_unstable();
-        let pair = names.windows(2).find(|pair| pair[0] == pair[1])?;
-        Some(pair[0].to_owned())
-    })
-}
-
 /// Adds a pass: checks every access, then makes the new versions.
 pub(crate) fn declare(
     graph: &mut Graph,
@@ -382,27 +408,17 @@ pub(crate) fn declare(
 pub struct ComputePass<'g> {
     graph: &'g mut Graph,
     name: String,
-    kernel: KernelRequest,
+    call: KernelCall,
     accesses: Vec<Access>,
-    uniforms: Vec<(Cow<'static, str>, UniformValue)>,
-    samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
 }
 
 impl<'g> ComputePass<'g> {
     pub(crate) fn new(graph: &'g mut Graph, path: Cow<'static, str>) -> Self {
-        let name = path.clone().into_owned();
-        let kernel = KernelRequest {
-            path,
-            features: Vec::new(),
-            constants: Vec::new(),
-        };
         Self {
             graph,
-            name,
-            kernel,
+            name: path.clone().into_owned(),
+            call: KernelCall::new(path),
             accesses: Vec::new(),
-            uniforms: Vec::new(),
-            samplers: Vec::new(),
         }
     }
 
@@ -469,7 +485,7 @@ impl<'g> ComputePass<'g> {
     /// Binds a sampler. Strict kernels filter by themselves: where one has no
     /// such sampler, it is left out.
     pub fn sampler(mut self, binding: impl Into<Cow<'static, str>>, sampler: SamplerDesc) -> Self {
-        self.samplers.push((binding.into(), sampler));
+        self.call.samplers.push((binding.into(), sampler));
         self
     }
 
@@ -479,21 +495,21 @@ impl<'g> ComputePass<'g> {
         member: impl Into<Cow<'static, str>>,
         value: impl Into<UniformValue>,
     ) -> Self {
-        self.uniforms.push((member.into(), value.into()));
+        self.call.uniforms.push((member.into(), value.into()));
         self
     }
 
     /// Sets one of the kernel's `override` constants, which makes a kernel of
     /// its own: for choices that rarely change.
     pub fn constant(mut self, name: impl Into<Cow<'static, str>>, value: f64) -> Self {
-        self.kernel.constants.push((name.into(), value));
+        self.call.kernel.constants.push((name.into(), value));
         self
     }
 
     /// Sets a feature that the kernel's `@if` conditions ask for, which makes a
     /// kernel of its own.
     pub fn feature(mut self, name: impl Into<Cow<'static, str>>, enabled: bool) -> Self {
-        self.kernel.features.push((name.into(), enabled));
+        self.call.kernel.features.push((name.into(), enabled));
         self
     }
 
@@ -560,10 +576,8 @@ impl<'g> ComputePass<'g> {
             let pass = ComputePass {
                 graph: &mut *self.graph,
                 name: format!("{} mip {mip}", self.name),
-                kernel: self.kernel.clone(),
+                call: self.call.clone(),
                 accesses: self.accesses.clone(),
-                uniforms: self.uniforms.clone(),
-                samplers: self.samplers.clone(),
             };
             newest = pass
                 .read(source.clone(), newest.mip(mip - 1))
@@ -608,22 +622,9 @@ impl<'g> ComputePass<'g> {
         self.read_buffer(binding, tiles).indirect(tiles, 0)
     }
 
-    fn dispatch(mut self, dispatch: Dispatch) -> Result<Written, GraphError> {
-        if let Some(name) = repeated(&self.kernel, &self.uniforms, &self.samplers) {
-            return Err(GraphError::GivenTwice {
-                pass: self.name,
-                name,
-            });
-        }
-        // A request's identity must not depend on the order of the calls.
-        self.kernel.constants.sort_by(|a, b| a.0.cmp(&b.0));
-        self.kernel.features.sort_by(|a, b| a.0.cmp(&b.0));
-        let work = Work::Compute {
-            kernel: self.kernel,
-            dispatch,
-            uniforms: self.uniforms,
-            samplers: self.samplers,
-        };
+    fn dispatch(self, dispatch: Dispatch) -> Result<Written, GraphError> {
+        let call = self.call.settled(&self.name)?;
+        let work = Work::Compute { call, dispatch };
         declare(self.graph, self.name, work, self.accesses)
     }
 }

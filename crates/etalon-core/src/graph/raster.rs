@@ -5,9 +5,8 @@ use std::ops::Range;
 
 use crate::format::SampleKind;
 use crate::graph::handle::{Buffer, TextureView};
-use crate::graph::pass::{AccessKind, Written, buffer, declare, repeated, texture};
+use crate::graph::pass::{AccessKind, KernelCall, Written, buffer, declare, texture};
 use crate::graph::{Access, ClearValue, Graph, GraphError, ResourceDesc, UniformValue, Work};
-use crate::kernel::KernelRequest;
 use crate::raster::{
     IndexFormat, MAX_COLOUR_TARGETS, RasterState, RasterStateError, Scissor, VertexLayout, Viewport,
 };
@@ -61,10 +60,8 @@ pub(crate) enum Extent {
 /// A declared draw; its accesses are in the pass, from `accesses` on.
 #[derive(Clone, Debug)]
 pub(crate) struct DeclaredDraw {
-    pub(crate) kernel: KernelRequest,
+    pub(crate) call: KernelCall,
     pub(crate) state: RasterState,
-    pub(crate) uniforms: Vec<(Cow<'static, str>, UniformValue)>,
-    pub(crate) samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
     pub(crate) vertices: Vec<Vertices>,
     pub(crate) indices: Option<Indices>,
     pub(crate) extent: Extent,
@@ -91,11 +88,9 @@ pub(crate) struct RasterWork {
 #[derive(Clone, Debug)]
 #[must_use = "a draw is drawn by the pass that it is given to"]
 pub struct Draw {
-    kernel: KernelRequest,
+    call: KernelCall,
     state: RasterState,
     accesses: Vec<Access>,
-    uniforms: Vec<(Cow<'static, str>, UniformValue)>,
-    samplers: Vec<(Cow<'static, str>, SamplerDesc)>,
     vertices: Vec<(Buffer, u64, VertexLayout)>,
     indices: Option<(Buffer, u64, IndexFormat)>,
     elements: Range<u32>,
@@ -109,11 +104,9 @@ impl Draw {
     /// [`elements`](Self::elements) or [`indirect`](Self::indirect).
     pub fn new(path: impl Into<Cow<'static, str>>) -> Self {
         Self {
-            kernel: KernelRequest::new(path),
+            call: KernelCall::new(path),
             state: RasterState::default(),
             accesses: Vec::new(),
-            uniforms: Vec::new(),
-            samplers: Vec::new(),
             vertices: Vec::new(),
             indices: None,
             elements: 0..0,
@@ -190,7 +183,7 @@ impl Draw {
 
     /// Binds a sampler; see [`ComputePass::sampler`](super::ComputePass::sampler).
     pub fn sampler(mut self, binding: impl Into<Cow<'static, str>>, sampler: SamplerDesc) -> Self {
-        self.samplers.push((binding.into(), sampler));
+        self.call.samplers.push((binding.into(), sampler));
         self
     }
 
@@ -200,19 +193,19 @@ impl Draw {
         member: impl Into<Cow<'static, str>>,
         value: impl Into<UniformValue>,
     ) -> Self {
-        self.uniforms.push((member.into(), value.into()));
+        self.call.uniforms.push((member.into(), value.into()));
         self
     }
 
     /// Sets one of the kernel's `override` constants.
     pub fn constant(mut self, name: impl Into<Cow<'static, str>>, value: f64) -> Self {
-        self.kernel.constants.push((name.into(), value));
+        self.call.kernel.constants.push((name.into(), value));
         self
     }
 
     /// Sets a feature that the kernel's `@if` conditions ask for.
     pub fn feature(mut self, name: impl Into<Cow<'static, str>>, enabled: bool) -> Self {
-        self.kernel.features.push((name.into(), enabled));
+        self.call.kernel.features.push((name.into(), enabled));
         self
     }
 }
@@ -443,11 +436,9 @@ fn declared(
         error: format!("draw {index}: {error}"),
     };
     let Draw {
-        mut kernel,
+        call,
         state,
         accesses: bound,
-        uniforms,
-        samplers,
         vertices,
         indices,
         elements,
@@ -455,15 +446,7 @@ fn declared(
         instances,
         indirect,
     } = draw;
-    if let Some(name) = repeated(&kernel, &uniforms, &samplers) {
-        return Err(GraphError::GivenTwice {
-            pass: pass.to_owned(),
-            name,
-        });
-    }
-    // A request's identity must not depend on the order of the calls.
-    kernel.constants.sort_by(|a, b| a.0.cmp(&b.0));
-    kernel.features.sort_by(|a, b| a.0.cmp(&b.0));
+    let call = call.settled(pass)?;
     state
         .validate(work.colours.len())
         .map_err(|error| refuse(error.to_string()))?;
@@ -536,10 +519,8 @@ fn declared(
         }
     };
     Ok(DeclaredDraw {
-        kernel,
+        call,
         state,
-        uniforms,
-        samplers,
         vertices: sources,
         indices,
         extent,

@@ -21,6 +21,7 @@
 //! | `modf frexp ldexp` | no | subnormals, and results out of range |
 //! | `quantizeToF16`, packing and unpacking of normalised and half floats | no | rounding is not fixed |
 //! | `transpose`, bit casts, conversions between numbers | yes | exact, or correctly rounded |
+//! | the same on `f16`, and conversions to it | yes | which neighbour is left open, as for `f32`; measured to be the nearest |
 //! | everything on integers and booleans, `dot` too | yes | exact |
 //! | `textureLoad`, `textureStore`, queries | yes | the store is to be rounded before |
 //! | `textureSample*`, `textureGather*` | no | weights have eight bits or more; so has the choice of texels |

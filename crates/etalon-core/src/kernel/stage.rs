@@ -51,6 +51,8 @@ pub struct VertexStage {
     pub entry_point: String,
     /// What it is fed from vertex buffers, by location.
     pub inputs: Vec<StageValue>,
+    /// What it passes on to fragments, by location.
+    pub outputs: Vec<StageValue>,
 }
 
 /// What makes the colours of fragments.
@@ -58,6 +60,8 @@ pub struct VertexStage {
 pub struct FragmentStage {
     /// Its name in the module.
     pub entry_point: String,
+    /// What it takes from vertices, by location.
+    pub inputs: Vec<StageValue>,
     /// What it puts out to colour targets, by location.
     pub outputs: Vec<StageValue>,
     /// Whether it puts out a depth of its own.
@@ -120,22 +124,33 @@ pub(super) fn stages(module: &Module, origin: &Origin<'_>) -> Result<Option<Stag
         return Ok(None);
     };
     only_reads(module, origin)?;
-    let vertex = VertexStage {
-        entry_point: vertex.name.clone(),
-        inputs: inputs(module, vertex, origin)?,
-    };
+    let passed = given(module, vertex, origin)?;
     let fragment = match entry(ShaderStage::Fragment) {
         None => None,
         Some(entry) => {
-            let (outputs, writes_depth) = outputs(module, entry, origin)?;
+            let inputs = taken(module, entry, origin)?;
+            suit(&passed, &inputs, origin)?;
+            let outputs = values(given(module, entry, origin)?);
+            if let Some(last) = outputs.last()
+                && last.location as usize >= MAX_COLOUR_TARGETS
+            {
+                let what = format!("is at location {}, over the last target's", last.location);
+                return Err(refused(&last.name, &what, origin));
+            }
             let mut functions = module.functions.iter().map(|(_, function)| &function.body);
             Some(FragmentStage {
                 entry_point: entry.name.clone(),
+                inputs: values(inputs),
                 outputs,
-                writes_depth,
+                writes_depth: writes_depth(module, entry),
                 discards: discards(&entry.function.body) || functions.any(discards),
             })
         }
+    };
+    let vertex = VertexStage {
+        entry_point: vertex.name.clone(),
+        inputs: values(taken(module, vertex, origin)?),
+        outputs: values(passed),
     };
     Ok(Some(Stages::Raster(RasterStages { vertex, fragment })))
 }
@@ -188,6 +203,88 @@ fn places<'m>(
     }
 }
 
+/// A value with a location, and where it is.
+struct Located<'m> {
+    place: &'m Place,
+    inner: &'m TypeInner,
+    value: StageValue,
+}
+
+/// Those of arguments or results that have locations, in their order.
+fn located<'m>(
+    places: impl IntoIterator<Item = (&'m Place, &'m TypeInner, Option<&'m str>)>,
+    origin: &Origin<'_>,
+) -> Result<Vec<Located<'m>>, KernelError> {
+    let mut found = Vec::new();
+    for (place, inner, name) in places {
+        if let Place::Location { location, .. } = *place {
+            found.push(Located {
+                place,
+                inner,
+                value: value(location, inner, name, origin)?,
+            });
+        }
+    }
+    found.sort_by_key(|one| one.value.location);
+    Ok(found)
+}
+
+/// What goes into an entry point.
+fn taken<'m>(
+    module: &'m Module,
+    entry: &'m EntryPoint,
+    origin: &Origin<'_>,
+) -> Result<Vec<Located<'m>>, KernelError> {
+    let arguments = entry.function.arguments.iter().flat_map(|argument| {
+        let (place, name) = (argument.binding.as_ref(), argument.name.as_deref());
+        places(module, argument.ty, place, name)
+    });
+    located(arguments, origin)
+}
+
+/// What comes out of an entry point.
+fn given<'m>(
+    module: &'m Module,
+    entry: &'m EntryPoint,
+    origin: &Origin<'_>,
+) -> Result<Vec<Located<'m>>, KernelError> {
+    let results = entry.function.result.iter().flat_map(|result| {
+        // A result without a structure has no name.
+        places(module, result.ty, result.binding.as_ref(), Some(COLOUR))
+    });
+    located(results, origin)
+}
+
+fn values(located: Vec<Located<'_>>) -> Vec<StageValue> {
+    located.into_iter().map(|one| one.value).collect()
+}
+
+/// What fragments take, vertices have to give, interpolated alike: validation looks
+/// at each stage by itself.
+fn suit(
+    outputs: &[Located<'_>],
+    inputs: &[Located<'_>],
+    origin: &Origin<'_>,
+) -> Result<(), KernelError> {
+    for input in inputs {
+        let StageValue { name, location, .. } = &input.value;
+        let mut same = outputs
+            .iter()
+            .filter(|output| output.value.location == *location);
+        let what = match same.next() {
+            Some(output) if (output.place, output.inner) == (input.place, input.inner) => continue,
+            Some(_) => "something else",
+            None => "nothing",
+        };
+        let message = format!(
+            "`{name}` is taken by fragments from location {location}, where vertices give {what}"
+        );
+        let diagnostic = origin.diagnostic(naga::Span::UNDEFINED, &message);
+        return Err(KernelError::Interface(diagnostic));
+    }
+    Ok(())
+}
+
 /// A value at a location, if it is of a kind that buffers and targets have.
 fn value(
     location: u32,
@@ -220,53 +317,17 @@ fn refused(name: &str, what: &str, origin: &Origin<'_>) -> KernelError {
     KernelError::Interface(origin.diagnostic(naga::Span::UNDEFINED, &message))
 }
 
-fn inputs(
-    module: &Module,
-    entry: &EntryPoint,
-    origin: &Origin<'_>,
-) -> Result<Vec<StageValue>, KernelError> {
-    let mut inputs = Vec::new();
-    for argument in &entry.function.arguments {
-        let (place, name) = (argument.binding.as_ref(), argument.name.as_deref());
-        for (place, inner, name) in places(module, argument.ty, place, name) {
-            if let Place::Location { location, .. } = *place {
-                inputs.push(value(location, inner, name, origin)?);
-            }
-        }
-    }
-    inputs.sort_by_key(|input| input.location);
-    Ok(inputs)
-}
-
-/// The outputs to colour targets, and whether there is one of depth.
-fn outputs(
-    module: &Module,
-    entry: &EntryPoint,
-    origin: &Origin<'_>,
-) -> Result<(Vec<StageValue>, bool), KernelError> {
-    let (mut outputs, mut depth) = (Vec::new(), false);
-    if let Some(result) = &entry.function.result {
-        for (place, inner, name) in places(module, result.ty, result.binding.as_ref(), None) {
-            match *place {
-                Place::BuiltIn(built_in) => depth |= built_in == naga::BuiltIn::FragDepth,
-                Place::Location { location, .. } => {
-                    // A result without a structure has no name.
-                    let value = value(location, inner, Some(name.unwrap_or(COLOUR)), origin)?;
-                    if location as usize >= MAX_COLOUR_TARGETS {
-                        let what = format!("is at location {location}, over the last target's");
-                        return Err(refused(&value.name, &what, origin));
-                    }
-                    outputs.push(value);
-                }
-            }
-        }
-    }
-    outputs.sort_by_key(|output| output.location);
-    Ok((outputs, depth))
-}
-
 /// What a fragment's only output is called if it is no structure's member.
 const COLOUR: &str = "colour";
+
+fn writes_depth(module: &Module, entry: &EntryPoint) -> bool {
+    let mut results = entry
+        .function
+        .result
+        .iter()
+        .flat_map(|result| places(module, result.ty, result.binding.as_ref(), None));
+    results.any(|(place, _, _)| *place == Place::BuiltIn(naga::BuiltIn::FragDepth))
+}
 
 fn discards(block: &naga::Block) -> bool {
     block.iter().any(|statement| match statement {

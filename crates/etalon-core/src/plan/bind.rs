@@ -3,8 +3,8 @@
 
 use crate::format::{SampleKind, StorageSupport};
 use crate::graph::{
-    Access, AccessKind, Dispatch, Graph, Pass, Resource, ResourceDesc, Subresources, UniformValue,
-    Work,
+    Access, AccessKind, Dispatch, Graph, KernelCall, Pass, Resource, ResourceDesc, Subresources,
+    UniformValue, Work,
 };
 use crate::kernel::{self, BindingKind, Kernel, KernelLibrary, UniformLayout, ViewDimension};
 use crate::plan::cull::Live;
@@ -12,7 +12,7 @@ use crate::plan::error::Mismatch;
 use crate::plan::{
     Bound, Groups, KernelRef, PlanError, PlanOptions, Step, UniformSlice, Usage, raster,
 };
-use crate::resource::{Dimension, SamplerDesc};
+use crate::resource::Dimension;
 use std::borrow::Cow;
 
 /// How a step uses part of a resource.
@@ -105,19 +105,13 @@ fn bind_pass(
     let source = simple(AccessKind::CopySource);
     let target = simple(AccessKind::CopyTarget);
     let step = match &pass.work {
-        Work::Compute {
-            kernel,
-            dispatch,
-            uniforms: values,
-            samplers,
-        } => {
-            let kernel =
-                kernels
-                    .get(kernel, options.arithmetic)
-                    .map_err(|error| PlanError::Kernel {
-                        pass: pass.name.clone(),
-                        error: Box::new(error),
-                    })?;
+        Work::Compute { call, dispatch } => {
+            let kernel = kernels
+                .get(&call.kernel, options.arithmetic)
+                .map_err(|error| PlanError::Kernel {
+                    pass: pass.name.clone(),
+                    error: Box::new(error),
+                })?;
             let binder = Binder {
                 graph,
                 pass,
@@ -132,7 +126,7 @@ fn bind_pass(
                     "a draw: it is a raster kernel",
                 ));
             };
-            let (bindings, uses) = binder.bindings(values, samplers, uniforms)?;
+            let (bindings, uses) = binder.bindings(call, uniforms)?;
             binder.layouts(&uses)?;
             let groups = binder.groups(dispatch, stage.workgroup_size)?;
             return Ok(BoundPass {
@@ -257,8 +251,7 @@ impl Binder<'_> {
     /// whatever is given besides.
     pub(crate) fn bindings(
         &self,
-        values: &[(Cow<'static, str>, UniformValue)],
-        samplers: &[(Cow<'static, str>, SamplerDesc)],
+        call: &KernelCall,
         uniforms: &mut Vec<u8>,
     ) -> Result<(Vec<Bound>, Vec<Use>), PlanError> {
         let mut bound = Vec::with_capacity(self.kernel.bindings.len());
@@ -269,10 +262,13 @@ impl Binder<'_> {
             bound.push(match &binding.kind {
                 BindingKind::Uniform(layout) => {
                     block = true;
-                    Bound::Uniform(self.uniforms(layout, values, uniforms)?)
+                    Bound::Uniform(self.uniforms(layout, &call.uniforms, uniforms)?)
                 }
                 BindingKind::Sampler { comparison } => {
-                    let given = samplers.iter().find(|(candidate, _)| candidate == name);
+                    let given = call
+                        .samplers
+                        .iter()
+                        .find(|(candidate, _)| candidate == name);
                     let (_, sampler) = given.ok_or_else(|| self.missing("sampler", name))?;
                     let kind = |comparison| {
                         if comparison {
@@ -320,7 +316,7 @@ impl Binder<'_> {
                 }
             });
         }
-        self.nothing_left(values, samplers, block)?;
+        self.nothing_left(call, block)?;
         for access in self
             .accesses
             .iter()
@@ -354,12 +350,7 @@ impl Binder<'_> {
     }
 
     /// Everything the pass gives must be wanted.
-    fn nothing_left(
-        &self,
-        values: &[(Cow<'static, str>, UniformValue)],
-        samplers: &[(Cow<'static, str>, SamplerDesc)],
-        block: bool,
-    ) -> Result<(), PlanError> {
+    fn nothing_left(&self, call: &KernelCall, block: bool) -> Result<(), PlanError> {
         let bindings = &self.kernel.bindings;
         let named = |name: &str| {
             bindings
@@ -387,12 +378,12 @@ impl Binder<'_> {
         }
         let is_sampler: fn(&BindingKind) -> bool =
             |kind| matches!(kind, BindingKind::Sampler { .. });
-        for (name, _) in samplers {
+        for (name, _) in &call.samplers {
             if !named(name).is_some_and(is_sampler) && !self.unused(name) {
                 return Err(self.not_in_kernel("sampler", name, of(is_sampler)));
             }
         }
-        match values.first() {
+        match call.uniforms.first() {
             Some((name, _)) if !block => {
                 Err(self.not_in_kernel("uniform", name, std::iter::empty()))
             }

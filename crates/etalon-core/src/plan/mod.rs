@@ -39,8 +39,8 @@ use serde::{Serialize, Serializer};
 
 pub use error::PlanError;
 pub use raster::{
-    DrawExtent, PlannedAttribute, PlannedDraw, PlannedIndices, PlannedTarget, PlannedVertices,
-    RasterStep,
+    DrawExtent, DrawForm, PlannedAttribute, PlannedDraw, PlannedIndices, PlannedLayout,
+    PlannedTarget, PlannedVertices, RasterStep,
 };
 
 use crate::graph::{ClearValue, Graph, ResourceDesc, Subresources};

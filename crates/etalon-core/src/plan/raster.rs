@@ -5,15 +5,16 @@ use std::ops::Range;
 
 use serde::Serialize;
 
+use crate::Format;
 use crate::format::SampleKind;
 use crate::graph::{
     Access, ClearValue, DeclaredDraw, Extent, Graph, Load, Pass, RasterWork, ResourceDesc, Slice,
     Subresources,
 };
-use crate::kernel::{Kernel, KernelLibrary, RasterStages, StageValue};
+use crate::kernel::{Kernel, KernelId, KernelLibrary, RasterStages, StageValue};
 use crate::plan::bind::{Binder, BoundPass, Use, layout_conflict};
 use crate::plan::error::Mismatch;
-use crate::plan::{Bound, KernelRef, PlanError, PlanOptions, Step, Usage};
+use crate::plan::{Bound, KernelRef, Plan, PlanError, PlanOptions, Step, Usage};
 use crate::raster::{
     IndexFormat, NumberKind, RasterState, Scissor, StepMode, VertexAttribute, VertexFormat,
     Viewport,
@@ -41,6 +42,17 @@ pub struct PlannedAttribute {
     pub offset: u32,
 }
 
+/// The elements of a vertex buffer, as a kernel takes them.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct PlannedLayout {
+    /// Bytes from one element to the next.
+    pub stride: u32,
+    /// When the next one is taken.
+    pub step: StepMode,
+    /// The inputs that the kernel has, by location; those it has not are left out.
+    pub attributes: Vec<PlannedAttribute>,
+}
+
 /// A buffer that vertex kernels are fed from.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct PlannedVertices {
@@ -48,12 +60,8 @@ pub struct PlannedVertices {
     pub buffer: u32,
     /// First byte.
     pub offset: u64,
-    /// Bytes from one element to the next.
-    pub stride: u32,
-    /// When the next one is taken.
-    pub step: StepMode,
-    /// The inputs that the kernel has, by location; those it has not are left out.
-    pub attributes: Vec<PlannedAttribute>,
+    /// What its elements are.
+    pub layout: PlannedLayout,
 }
 
 /// A buffer of indices.
@@ -122,6 +130,45 @@ pub struct RasterStep {
     pub scissor: Scissor,
     /// The draws, in order.
     pub draws: Vec<PlannedDraw>,
+}
+
+/// Everything about a draw that makes a pipeline: draws of one form can share it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct DrawForm {
+    /// The kernel.
+    pub kernel: KernelId,
+    /// Culling, depth and blending.
+    pub state: RasterState,
+    /// What the vertex kernel is fed from.
+    pub vertices: Vec<PlannedLayout>,
+    /// Formats of the colour targets, by location.
+    pub colours: Vec<Format>,
+    /// The format of the depth target.
+    pub depth: Option<Format>,
+}
+
+impl DrawForm {
+    /// The form of a draw of a plan's step; `None` if a target is no texture,
+    /// which planning makes none of.
+    #[must_use]
+    pub fn new(plan: &Plan, step: &RasterStep, draw: &PlannedDraw) -> Option<Self> {
+        let format =
+            |target: &PlannedTarget| match plan.resources.get(target.resource as usize)?.desc {
+                ResourceDesc::Texture(desc) => Some(desc.format),
+                ResourceDesc::Buffer(_) => None,
+            };
+        let vertices = draw.vertices.iter();
+        Some(Self {
+            kernel: draw.kernel.0.id,
+            state: draw.state.clone(),
+            vertices: vertices.map(|vertices| vertices.layout.clone()).collect(),
+            colours: step.colours.iter().map(format).collect::<Option<_>>()?,
+            depth: match &step.depth {
+                Some(target) => Some(format(target)?),
+                None => None,
+            },
+        })
+    }
 }
 
 impl RasterStep {
@@ -202,7 +249,7 @@ pub(crate) fn bind_raster(
     let mut draws = Vec::with_capacity(work.draws.len());
     for draw in &work.draws {
         let kernel = kernels
-            .get(&draw.kernel, options.arithmetic)
+            .get(&draw.call.kernel, options.arithmetic)
             .map_err(|error| PlanError::Kernel {
                 pass: pass.name.clone(),
                 error: Box::new(error),
@@ -227,7 +274,7 @@ pub(crate) fn bind_raster(
             kernel: work
                 .draws
                 .first()
-                .map_or("", |draw| &draw.kernel.path)
+                .map_or("", |draw| &draw.call.kernel.path)
                 .to_owned(),
             mismatch: Mismatch::Differs {
                 name: name.to_owned(),
@@ -289,7 +336,7 @@ impl Drawn<'_> {
                 "a dispatch: it is a compute kernel",
             ));
         };
-        let (bindings, bound) = binder.bindings(&draw.uniforms, &draw.samplers, uniforms)?;
+        let (bindings, bound) = binder.bindings(&draw.call, uniforms)?;
         uses.extend(bound);
         let mut state = draw.state.clone();
         state.targets.resize(self.targets.len(), Default::default());
@@ -452,9 +499,11 @@ impl Drawn<'_> {
             planned.push(PlannedVertices {
                 buffer,
                 offset: source.slice.offset,
-                stride: layout.stride,
-                step: layout.step,
-                attributes,
+                layout: PlannedLayout {
+                    stride: layout.stride,
+                    step: layout.step,
+                    attributes,
+                },
             });
         }
         Ok(planned)

@@ -13,9 +13,10 @@ pub enum Topology {
     /// Three vertices each.
     #[default]
     TriangleList,
-    /// Each vertex after the first two makes a triangle with the two before it;
-    /// of every second triangle the first two corners are exchanged, so that all
-    /// face the same way. The largest index begins a new strip.
+    /// Each vertex after the first two makes a triangle with the two before it; of
+    /// every second triangle the last two corners are exchanged, so that all face
+    /// the same way and the first one stays that of flat inputs (Vulkan 1.3,
+    /// §21.1.4). The largest index begins a new strip.
     TriangleStrip,
 }
 
@@ -47,7 +48,9 @@ pub enum CullMode {
 /// the larger of the depth's derivatives in x and y and `r` the unit in the last
 /// place of the triangle's largest depth (of a fixed-point format, of any)
 /// (Vulkan 1.3, §28.10.2; WebGPU, §23.2.6).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+///
+/// Compared and hashed by bits, so that states can be looked up.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub struct DepthBias {
     /// Times the unit in the last place.
     pub constant: i32,
@@ -57,9 +60,23 @@ pub struct DepthBias {
     pub clamp: f32,
 }
 
+impl DepthBias {
+    fn bits(&self) -> (i32, u32, u32) {
+        (self.constant, self.slope.to_bits(), self.clamp.to_bits())
+    }
+}
+
+impl PartialEq for DepthBias {
+    fn eq(&self, other: &Self) -> bool {
+        self.bits() == other.bits()
+    }
+}
+
+impl Eq for DepthBias {}
+
 impl Hash for DepthBias {
     fn hash<H: Hasher>(&self, state: &mut H) {
-        (self.constant, self.slope.to_bits(), self.clamp.to_bits()).hash(state);
+        self.bits().hash(state);
     }
 }
 
@@ -76,7 +93,7 @@ impl DepthBias {
 /// With standard depth, 0 near and 1 far, [`Compare::Less`] draws what is
 /// nearer; with reversed depth, 1 near and 0 far or at infinity,
 /// [`Compare::Greater`] does.
-#[derive(Clone, Copy, Debug, PartialEq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct DepthState {
     /// `fragment OP depth` must hold for a fragment to be drawn.
     pub compare: Compare,
@@ -258,7 +275,7 @@ pub struct TargetState {
 }
 
 /// What a draw does beside its kernel.
-#[derive(Clone, Debug, Default, PartialEq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct RasterState {
     /// How vertices make triangles.
     pub topology: Topology,

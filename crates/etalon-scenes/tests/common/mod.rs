@@ -5,6 +5,8 @@ pub(crate) mod exr_files;
 pub(crate) mod gltf_files;
 pub(crate) mod shapes;
 
+use std::path::PathBuf;
+
 use etalon_core::image::ImageData;
 use etalon_scenes::{FrameSize, World, scene};
 use glam::DVec2;
@@ -74,6 +76,21 @@ impl Random {
             if (0.01..1.0).contains(&vector.length_squared()) {
                 return vector.normalize();
             }
+        }
+    }
+}
+
+/// The path of an input below the folder that `ETALON_INPUTS` names, if it is there.
+pub(crate) fn input(name: &str) -> Option<PathBuf> {
+    match std::env::var_os("ETALON_INPUTS").map(|folder| PathBuf::from(folder).join(name)) {
+        Some(path) if path.exists() => Some(path),
+        Some(path) => {
+            println!("skipped: there is no {}", path.display());
+            None
+        }
+        None => {
+            println!("skipped: ETALON_INPUTS is not set");
+            None
         }
     }
 }

@@ -256,7 +256,7 @@ impl Drawn<'_> {
     fn vertices(&self, stages: &RasterStages) -> Result<(), BackendError> {
         let Self { checker, draw, .. } = self;
         let limits = checker.gpu.raw_limits();
-        let attributes = || draw.vertices.iter().flat_map(|it| &it.attributes);
+        let attributes = || draw.vertices.iter().flat_map(|it| &it.layout.attributes);
         for (what, given, most) in [
             (
                 "vertex buffers",
@@ -312,7 +312,7 @@ impl Drawn<'_> {
     fn vertex_buffer(&self, vertices: &PlannedVertices) -> Result<(), BackendError> {
         let Self { checker, draw, .. } = self;
         let bytes = checker.buffer(vertices.buffer)?;
-        let (stride, offset) = (vertices.stride, vertices.offset);
+        let (stride, offset) = (vertices.layout.stride, vertices.offset);
         let most = checker.gpu.raw_limits().max_vertex_buffer_array_stride;
         if stride > most {
             return Err(
@@ -320,7 +320,7 @@ impl Drawn<'_> {
             );
         }
         let mut tail = 0;
-        for attribute in &vertices.attributes {
+        for attribute in &vertices.layout.attributes {
             let size = attribute.format.bytes();
             tail = tail.max(u64::from(attribute.offset) + u64::from(size));
             if !attribute.offset.is_multiple_of(size.min(4)) {
@@ -330,7 +330,7 @@ impl Drawn<'_> {
         if !stride.is_multiple_of(4) || !offset.is_multiple_of(4) || tail > stride.into() {
             return Err(checker.malformed("its vertices are not aligned, or overlap"));
         }
-        if vertices.attributes.is_empty() || does_nothing(&draw.extent) {
+        if vertices.layout.attributes.is_empty() || does_nothing(&draw.extent) {
             return Ok(());
         }
         // The last element that is read for sure; those that indices or records
@@ -341,7 +341,7 @@ impl Drawn<'_> {
                 elements,
                 instances,
                 ..
-            } => match vertices.step {
+            } => match vertices.layout.step {
                 StepMode::Instance => instances.end - 1,
                 StepMode::Vertex if draw.indices.is_none() => elements.end - 1,
                 StepMode::Vertex => 0,

@@ -1,6 +1,6 @@
 //! The state of draws in wgpu's words.
 
-use etalon_core::plan::{PlannedAttribute, PlannedVertices};
+use etalon_core::plan::{PlannedAttribute, PlannedLayout};
 use etalon_core::raster::{
     Blend, BlendComponent, BlendFactor, BlendOperation, ColourWrites, CullMode, DepthState,
     FrontFace, IndexFormat, RasterState, StepMode, TargetState, Topology, VertexFormat,
@@ -54,7 +54,7 @@ pub(super) fn attributes(attributes: &[PlannedAttribute]) -> Vec<wgpu::VertexAtt
 /// The layout of a buffer; `None` if nothing is fed from it, so that it need
 /// not be bound.
 pub(super) fn vertex_layout<'a>(
-    vertices: &PlannedVertices,
+    vertices: &PlannedLayout,
     attributes: &'a [wgpu::VertexAttribute],
 ) -> Option<wgpu::VertexBufferLayout<'a>> {
     (!attributes.is_empty()).then(|| wgpu::VertexBufferLayout {

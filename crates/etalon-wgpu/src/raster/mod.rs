@@ -9,7 +9,9 @@ use std::sync::Arc;
 
 use etalon_core::backend::BackendError;
 use etalon_core::graph::{ClearValue, ResourceDesc};
-use etalon_core::plan::{Bound, DrawExtent, Plan, PlannedDraw, PlannedTarget, RasterStep};
+use etalon_core::plan::{
+    Bound, DrawExtent, DrawForm, Plan, PlannedDraw, PlannedTarget, RasterStep,
+};
 use etalon_core::raster::MAX_COLOUR_TARGETS;
 
 pub(crate) use check::check;
@@ -19,7 +21,7 @@ use crate::bind::{BindContext, PerPhysical, Physical, Samplers, touched};
 use crate::fault::unsupported;
 use crate::gpu::Gpu;
 use crate::timing::Stamp;
-use pipeline::{Formats, RenderPipeline};
+use pipeline::RenderPipeline;
 
 /// A step of draws, ready to be recorded for any targets of one shape.
 #[derive(Debug)]
@@ -63,17 +65,6 @@ impl Raster {
         pipelines: &mut Pipelines,
         samplers: &mut Samplers,
     ) -> Result<Self, BackendError> {
-        let format = |target: &PlannedTarget| {
-            let resource = plan.resources.get(target.resource as usize);
-            match resource.map(|resource| &resource.desc) {
-                Some(ResourceDesc::Texture(desc)) => Ok(desc.format),
-                _ => Err(unsupported(name, "a target that is no texture")),
-            }
-        };
-        let formats = Formats {
-            colours: step.colours.iter().map(format).collect::<Result<_, _>>()?,
-            depth: step.depth.as_ref().map(format).transpose()?,
-        };
         let mut draws = Vec::with_capacity(step.draws.len());
         for draw in &step.draws {
             for bound in &draw.bindings {
@@ -81,8 +72,10 @@ impl Raster {
                     samplers.add(gpu, desc)?;
                 }
             }
+            let form = DrawForm::new(plan, step, draw)
+                .ok_or_else(|| unsupported(name, "a target that is no texture"))?;
             draws.push(PreparedDraw {
-                pipeline: pipelines.get(gpu, name, draw, &formats)?,
+                pipeline: pipelines.get(gpu, name, draw, form)?,
                 groups: PerPhysical::default(),
             });
         }
@@ -213,7 +206,7 @@ impl Recording<'_> {
     /// Records one draw.
     fn draw(&self, pass: &mut wgpu::RenderPass<'_>, draw: &PlannedDraw) -> Option<()> {
         for (slot, vertices) in (0..).zip(&draw.vertices) {
-            if !vertices.attributes.is_empty() {
+            if !vertices.layout.attributes.is_empty() {
                 pass.set_vertex_buffer(slot, self.slice(vertices.buffer, vertices.offset)?);
             }
         }

@@ -6,91 +6,19 @@ use std::sync::Arc;
 use etalon_core::Format;
 use etalon_core::backend::BackendError;
 use etalon_core::kernel::{Kernel, KernelId};
-use etalon_core::plan::{PlannedAttribute, PlannedDraw};
-use etalon_core::raster::{CullMode, FrontFace, IndexFormat, StepMode, TargetState, Topology};
-use etalon_core::resource::Compare;
+use etalon_core::plan::{DrawForm, PlannedDraw};
+use etalon_core::raster::{IndexFormat, Topology};
 
 use super::{convert, stages};
 use crate::gpu::Gpu;
 use crate::pipeline::{check_needs, layout_entry, translated};
 use crate::spirv;
 
-/// The targets that a draw is drawn to.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub(super) struct Formats {
-    pub(super) colours: Vec<Format>,
-    pub(super) depth: Option<Format>,
-}
-
-/// How depth is compared, by bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-struct DepthKey {
-    compare: Compare,
-    write: bool,
-    constant: i32,
-    slope: u32,
-    clamp: u32,
-}
-
-/// What is fed from one buffer.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct VertexKey {
-    stride: u32,
-    step: StepMode,
-    attributes: Vec<PlannedAttribute>,
-}
-
-/// Everything that makes a pipeline what it is.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-struct Key {
-    kernel: KernelId,
-    topology: Topology,
-    /// The format of a strip's indices.
-    strip: Option<IndexFormat>,
-    front: FrontFace,
-    cull: CullMode,
-    depth: Option<DepthKey>,
-    targets: Vec<TargetState>,
-    formats: Formats,
-    vertices: Vec<VertexKey>,
-}
-
 /// The format of the indices of a draw, if they make a strip.
 fn strip(draw: &PlannedDraw) -> Option<IndexFormat> {
     match draw.state.topology {
         Topology::TriangleList => None,
         Topology::TriangleStrip => draw.indices.map(|indices| indices.format),
-    }
-}
-
-impl Key {
-    fn new(draw: &PlannedDraw, formats: &Formats) -> Self {
-        let state = &draw.state;
-        Self {
-            kernel: draw.kernel.0.id,
-            topology: state.topology,
-            strip: strip(draw),
-            front: state.front,
-            cull: state.cull,
-            depth: state.depth.map(|depth| DepthKey {
-                compare: depth.compare,
-                write: depth.write,
-                constant: depth.bias.constant,
-                slope: depth.bias.slope.to_bits(),
-                clamp: depth.bias.clamp.to_bits(),
-            }),
-            targets: state.targets.clone(),
-            formats: formats.clone(),
-            vertices: draw
-                .vertices
-                .iter()
-                .map(|vertices| VertexKey {
-                    stride: vertices.stride,
-                    step: vertices.step,
-                    attributes: vertices.attributes.clone(),
-                })
-                .collect(),
-        }
     }
 }
 
@@ -114,7 +42,8 @@ pub(crate) struct RenderPipeline {
 /// Every pipeline there is, and what they share.
 #[derive(Debug, Default)]
 pub(crate) struct Pipelines {
-    known: HashMap<Key, Arc<RenderPipeline>>,
+    /// By form and, of strips, the format of the indices.
+    known: HashMap<(DrawForm, Option<IndexFormat>), Arc<RenderPipeline>>,
     shaders: HashMap<KernelId, Arc<Shaders>>,
     blank: Option<wgpu::ShaderModule>,
 }
@@ -131,12 +60,13 @@ impl Pipelines {
         gpu: &Gpu,
         step: &str,
         draw: &PlannedDraw,
-        formats: &Formats,
+        form: DrawForm,
     ) -> Result<Arc<RenderPipeline>, BackendError> {
-        let key = Key::new(draw, formats);
+        let key = (form, strip(draw));
         if let Some(pipeline) = self.known.get(&key) {
             return Ok(pipeline.clone());
         }
+        let (form, strip) = &key;
         let kernel = &draw.kernel.0;
         let shaders = match self.shaders.get(&kernel.id) {
             Some(shaders) => shaders.clone(),
@@ -146,7 +76,7 @@ impl Pipelines {
                 made
             }
         };
-        if shaders.fragment.is_none() && !formats.colours.is_empty() && self.blank.is_none() {
+        if shaders.fragment.is_none() && !form.colours.is_empty() && self.blank.is_none() {
             let source = wgpu::ShaderModuleDescriptor {
                 label: Some("etalon blank"),
                 source: wgpu::ShaderSource::Wgsl(BLANK.into()),
@@ -156,7 +86,14 @@ impl Pipelines {
                 .map_err(|fault| fault.of_kernel(step))?;
             self.blank = Some(blank);
         }
-        let raw = pipeline(gpu, step, draw, formats, &shaders, self.blank.as_ref())?;
+        let raw = pipeline(
+            gpu,
+            step,
+            kernel,
+            (form, *strip),
+            &shaders,
+            self.blank.as_ref(),
+        )?;
         let made = Arc::new(RenderPipeline { raw, shaders });
         self.known.insert(key, made.clone());
         Ok(made)
@@ -225,36 +162,35 @@ impl Shaders {
 fn pipeline(
     gpu: &Gpu,
     step: &str,
-    draw: &PlannedDraw,
-    formats: &Formats,
+    kernel: &Kernel,
+    (form, strip): (&DrawForm, Option<IndexFormat>),
     shaders: &Shaders,
     blank: Option<&wgpu::ShaderModule>,
 ) -> Result<wgpu::RenderPipeline, BackendError> {
-    let kernel = &draw.kernel.0;
-    let attributes: Vec<_> = draw
+    let attributes: Vec<_> = form
         .vertices
         .iter()
         .map(|vertices| convert::attributes(&vertices.attributes))
         .collect();
-    let buffers: Vec<_> = draw
+    let buffers: Vec<_> = form
         .vertices
         .iter()
         .zip(&attributes)
         .map(|(vertices, attributes)| convert::vertex_layout(vertices, attributes))
         .collect();
     let raw_format = |format: Format| gpu.format(format).map(|(raw, _)| raw);
-    let targets: Vec<_> = formats
+    let targets: Vec<_> = form
         .colours
         .iter()
         .enumerate()
         .map(|(index, format)| {
-            raw_format(*format).map(|raw| convert::target(&draw.state.target(index), raw))
+            raw_format(*format).map(|raw| convert::target(&form.state.target(index), raw))
         })
         .collect();
-    let depth_stencil = formats
+    let depth_stencil = form
         .depth
         .and_then(raw_format)
-        .map(|raw| convert::depth(draw.state.depth.as_ref(), raw));
+        .map(|raw| convert::depth(form.state.depth.as_ref(), raw));
     let stages = kernel.raster();
     let module = match &shaders.fragment {
         Some(module) => Some((
@@ -262,7 +198,7 @@ fn pipeline(
             stages.and_then(|stages| stages.fragment.as_ref()?.entry_point.as_str().into()),
         )),
         // Depth alone takes no fragment stage, and is faster without.
-        None if formats.colours.is_empty() => None,
+        None if form.colours.is_empty() => None,
         None => blank.map(|module| (module, None)),
     };
     let raw = gpu
@@ -277,7 +213,7 @@ fn pipeline(
                         compilation_options: wgpu::PipelineCompilationOptions::default(),
                         buffers: &buffers,
                     },
-                    primitive: convert::primitive(&draw.state, strip(draw)),
+                    primitive: convert::primitive(&form.state, strip),
                     depth_stencil,
                     multisample: wgpu::MultisampleState::default(),
                     fragment: module.map(|(module, entry_point)| wgpu::FragmentState {

@@ -131,6 +131,42 @@ fn what_cannot_be_drawn_is_refused() {
     assert!(error.to_string().contains("location 8"), "{error}");
 }
 
+#[test]
+fn stages_that_do_not_suit_each_other_are_refused() {
+    let vertex = "struct Corner { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
+        @vertex fn vertex(@location(0) position: vec4f) -> Corner {
+            return Corner(position, position.xy); }";
+    let with = |input: &str| {
+        format!(
+            "{vertex} @fragment fn fragment({input}) -> @location(0) vec4f {{
+             return vec4f(uv.x); }}"
+        )
+    };
+    assert!(compile_one(&with("@location(0) uv: vec2f"), Arithmetic::Fast).is_ok());
+    for (input, part) in [
+        (
+            "@location(1) uv: vec2f",
+            "location 1, where vertices give nothing",
+        ),
+        (
+            "@location(3) uv: vec2f",
+            "location 3, where vertices give nothing",
+        ),
+        (
+            "@location(0) uv: vec3f",
+            "location 0, where vertices give something else",
+        ),
+        (
+            "@location(0) @interpolate(linear) uv: vec2f",
+            "location 0, where vertices give something else",
+        ),
+    ] {
+        let error = error_of(&with(input));
+        assert!(matches!(error, KernelError::Interface(_)), "{error}");
+        assert!(error.to_string().contains(part), "{error}");
+    }
+}
+
 /// Each stage by itself passes for SPIR-V with one entry point of that stage.
 #[test]
 #[cfg(feature = "spirv")]

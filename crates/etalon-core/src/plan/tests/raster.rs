@@ -183,14 +183,15 @@ fn draws_are_planned_after_what_they_draw_over() {
     assert_eq!(name(draw.vertices[0].buffer), "corners");
     assert_eq!(name(draw.indices.unwrap().buffer), "indices");
     let locations: Vec<(u32, u32)> = draw.vertices[0]
+        .layout
         .attributes
         .iter()
         .map(|attribute| (attribute.location, attribute.offset))
         .collect();
     assert_eq!(locations, [(0, 0), (1, 12)]);
-    assert_eq!(draw.vertices[1].step, StepMode::Instance);
+    assert_eq!(draw.vertices[1].layout.step, StepMode::Instance);
     // What the depth kernel does not want is left out.
-    assert_eq!(first.draws[0].vertices[0].attributes.len(), 1);
+    assert_eq!(first.draws[0].vertices[0].layout.attributes.len(), 1);
     let to = |step: usize| {
         let barriers = &plan.steps[step].barriers;
         let mut to: Vec<(&str, Usage)> =

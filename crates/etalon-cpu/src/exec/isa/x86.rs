@@ -322,8 +322,8 @@ unsafe fn runs(index: [u32; BLOCK]) -> Option<(usize, usize)> {
     }
 }
 
-/// Words at eight indices. Mostly they are of one row of a texture, next to each other: two loads and a permutation then
-/// cost less than a gather.
+/// Words at eight indices. Mostly they are of one row of a texture, next to each
+/// other: two loads and a permutation then cost less than a gather.
 ///
 /// # Safety
 /// As for [`Isa::load8`], where there is AVX-512.

@@ -11,37 +11,6 @@ use etalon_core::resource::TextureDesc;
 use etalon_wgpu::WgpuBackend;
 
 #[test]
-fn stages_that_do_not_fit_each_other_are_an_error_of_the_kernel() {
-    let vertex = "struct Corner { @builtin(position) clip: vec4f, @location(0) uv: vec2f }
-         @vertex fn vertex(@location(0) position: vec4f) -> Corner { return Corner(position, position.xy); }";
-    for input in [
-        "@location(1) uv: vec2f",
-        "@location(0) uv: vec3f",
-        "@location(0) @interpolate(linear) uv: vec2f",
-    ] {
-        on_vulkan(|backend| {
-            let mut library = kernels();
-            library.add_source(
-                "test/torn",
-                &format!("{vertex} @fragment fn fragment({input}) -> @location(0) vec4f {{ return vec4f(uv.x); }}"),
-            );
-            let mut scene = Scene::default();
-            let corners = scene.floats("corners", &rectangle((2, 2), (0.0, 0.0), (2.0, 2.0), 0.0));
-            let draw = Draw::new("test/torn")
-                .vertices(corners, 0, positions())
-                .elements(0..6);
-            scene.draw((2, 2), Format::Rgba8Unorm, [draw]);
-            let error = scene.attempt(backend, &library).unwrap_err();
-            let BackendError::Kernel { step, error } = &error else {
-                panic!("{error}");
-            };
-            assert_eq!(step, "draws");
-            assert!(error.to_string().contains("`test/torn`"), "{error}");
-        });
-    }
-}
-
-#[test]
 fn outputs_with_too_few_numbers_are_refused() {
     on_vulkan(|backend| {
         let mut library = kernels();
@@ -133,12 +102,12 @@ fn plans_of_draws_that_contradict_themselves_are_refused() {
             });
         },
         |step| step.draws[0].vertices.clear(),
-        |step| step.draws[0].vertices[0].attributes[0].location = 7,
-        |step| step.draws[0].vertices[0].attributes[0].format = VertexFormat::Uint32x4,
-        |step| step.draws[0].vertices[0].attributes[0].offset = 4,
+        |step| step.draws[0].vertices[0].layout.attributes[0].location = 7,
+        |step| step.draws[0].vertices[0].layout.attributes[0].format = VertexFormat::Uint32x4,
+        |step| step.draws[0].vertices[0].layout.attributes[0].offset = 4,
         |step| step.draws[0].vertices[0].offset = 2,
-        |step| step.draws[0].vertices[0].stride = 17,
-        |step| step.draws[0].vertices[0].stride = u32::MAX - 3,
+        |step| step.draws[0].vertices[0].layout.stride = 17,
+        |step| step.draws[0].vertices[0].layout.stride = u32::MAX - 3,
         |step| step.draws[0].vertices[0].buffer = 99,
         |step| step.draws[1].vertices[0].offset = 1 << 40,
         |step| {

@@ -327,8 +327,8 @@ fn every_factor_and_operation_blends_in_order() {
             _ => None,
         };
         for &(from, to, colour) in &quads {
-            for x in from as usize..(to as usize).min(16) {
-                let Texel::Float(there) = format.decode(&want[x]) else {
+            for bytes in &mut want[from as usize..(to as usize).min(16)] {
+                let Texel::Float(there) = format.decode(bytes) else {
                     unreachable!()
                 };
                 let s = colour.map(|channel| low.map_or(channel, |low| channel.clamp(low, 1.0)));
@@ -336,7 +336,7 @@ fn every_factor_and_operation_blends_in_order() {
                     let part = if c == 3 { blend.alpha } else { blend.colour };
                     blended(part, s, there, c)
                 });
-                format.encode(Texel::Float(new), &mut want[x]);
+                format.encode(Texel::Float(new), bytes);
             }
         }
         let bytes = targets.colours[0].to_image().unwrap().bytes;

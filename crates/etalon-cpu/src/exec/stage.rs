@@ -157,9 +157,7 @@ impl<N: Number, const K: usize> TieredStep<N> for Derivative<K> {
                         (false, true) => [b.sub(a); 4],
                         (true, true) => [c.sub(a); 4],
                     };
-                    for k in 0..4 {
-                        out[first + k] = differences[k];
-                    }
+                    out[first..first + 4].copy_from_slice(&differences);
                 }
             }
             state.set_floats(to, chunk, &out);

@@ -108,7 +108,7 @@ impl RasterProgram {
             let word = buffer.word(at).unwrap_or(0);
             match indices.format {
                 IndexFormat::Uint32 => word,
-                IndexFormat::Uint16 if at % 4 == 0 => word & 0xffff,
+                IndexFormat::Uint16 if at.is_multiple_of(4) => word & 0xffff,
                 IndexFormat::Uint16 => word >> 16,
             }
         }));

@@ -20,6 +20,9 @@
 //! [number type](crate::NumberType): a wide plane of a target gets the values of its
 //! texels. [Checks](crate::Checks) and profiles do not watch these kernels.
 
+// Loops over lanes index several arrays of lanes alike.
+#![allow(clippy::needless_range_loop)]
+
 mod clip;
 mod depth;
 mod draw;

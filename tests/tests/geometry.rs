@@ -1,7 +1,7 @@
 //! What is drawn is what exact rays see: depth, normals and velocity of every
 //! model, on every backend.
 
-use etalon::backend::{Backend, BackendError, Execution};
+use etalon::backend::{Backend, Execution};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
@@ -80,7 +80,7 @@ fn draw(
         Capture::Outputs,
     )
     .unwrap();
-    executor.execute(&plan, &drawable.inputs())
+    executor.execute(&plan, &drawable.inputs()).unwrap()
 }
 
 fn texel(image: &ImageData, x: u32, y: u32) -> [f64; 4] {
@@ -163,7 +163,7 @@ fn what_is_drawn_is_what_exact_rays_see() {
     let size = FrameSize::new(320, 180).unwrap();
     for scene in &scenes(size) {
         for executor in &mut executors() {
-            let drawn = draw(executor.as_mut(), scene, size).unwrap();
+            let drawn = draw(executor.as_mut(), scene, size);
             let found = compare(scene, size, &drawn);
             let who = format!("{} on {}: {found:?}", scene.name, executor.info());
             println!("{who}");
@@ -195,13 +195,13 @@ fn a_scene_seen_from_elsewhere_is_found() {
     );
     let mut executors = executors();
     let executor = executors[0].as_mut();
-    let good = compare(scene, size, &draw(executor, scene, size).unwrap());
+    let good = compare(scene, size, &draw(executor, scene, size));
     let seen = scene.camera;
     let fov = seen.vertical_fov();
     scene.camera = Camera::new(moved.unwrap(), fov)
         .unwrap()
         .moved_from(seen.previous_pose());
-    let drawn = draw(executor, scene, size).unwrap();
+    let drawn = draw(executor, scene, size);
     scene.camera = seen;
     let bad = compare(scene, size, &drawn);
     assert!(good.depth <= 4.0 && bad.depth > 40.0, "{good:?}, {bad:?}");

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use etalon_core::resource::Compare;
 
 use super::setup::{Region, TILE};
-use crate::memory::{Level, Texels, TextureView};
+use crate::memory::{Texels, TextureView};
 
 /// Pixels of a tile.
 pub(super) const PIXELS: usize = (TILE * TILE) as usize;
@@ -14,12 +14,6 @@ pub(super) const PIXELS: usize = (TILE * TILE) as usize;
 /// one of each quad, then the two below. Depth16Unorm as multiples of 1/65535.
 pub(super) struct TileDepth {
     pub(super) values: Box<[f32; PIXELS]>,
-}
-
-/// Where a pixel of a tile is in it.
-#[inline(always)]
-pub(super) fn place(x: u32, y: u32) -> usize {
-    ((y / 2 * (TILE / 2) + x / 2) * 4 + y % 2 * 2 + x % 2) as usize
 }
 
 impl TileDepth {
@@ -32,55 +26,103 @@ impl TileDepth {
     /// Reads the depths of the pixels of a region that are in the tile that begins
     /// at `x`, `y`.
     pub(super) fn load(&mut self, view: &TextureView<'_>, x: u32, y: u32, region: &Region) {
-        each_pixel(view, x, y, region, |place, index| {
-            self.values[place] = match view.texels {
-                Texels::B4(words) => words
-                    .get(index)
-                    .map_or(0.0, |word| f32::from_bits(word.load(Ordering::Relaxed))),
-                Texels::B2(words) => words
-                    .get(index)
-                    .map_or(0.0, |word| word.load(Ordering::Relaxed).into()),
-                _ => 0.0,
-            };
-        });
-    }
-
-    /// Writes them back.
-    pub(super) fn store(&self, view: &TextureView<'_>, x: u32, y: u32, region: &Region) {
-        each_pixel(view, x, y, region, |place, index| {
-            let value = self.values[place];
+        for row in Rows::new(view, x, y, region) {
             match view.texels {
                 Texels::B4(words) => {
-                    if let Some(word) = words.get(index) {
-                        word.store(value.to_bits(), Ordering::Relaxed);
+                    let words = words.get(row.texels.clone()).unwrap_or(&[]);
+                    for (i, word) in words.iter().enumerate() {
+                        let bits = word.load(Ordering::Relaxed);
+                        self.values[row.place(i)] = f32::from_bits(bits);
                     }
                 }
                 Texels::B2(words) => {
-                    if let Some(word) = words.get(index) {
-                        word.store(value as u16, Ordering::Relaxed);
+                    let words = words.get(row.texels.clone()).unwrap_or(&[]);
+                    for (i, word) in words.iter().enumerate() {
+                        self.values[row.place(i)] = word.load(Ordering::Relaxed).into();
                     }
                 }
                 _ => {}
             }
-        });
+        }
+    }
+
+    /// Writes them back.
+    pub(super) fn store(&self, view: &TextureView<'_>, x: u32, y: u32, region: &Region) {
+        for row in Rows::new(view, x, y, region) {
+            match view.texels {
+                Texels::B4(words) => {
+                    let words = words.get(row.texels.clone()).unwrap_or(&[]);
+                    for (i, word) in words.iter().enumerate() {
+                        let value = self.values[row.place(i)];
+                        word.store(value.to_bits(), Ordering::Relaxed);
+                    }
+                }
+                Texels::B2(words) => {
+                    let words = words.get(row.texels.clone()).unwrap_or(&[]);
+                    for (i, word) in words.iter().enumerate() {
+                        word.store(self.values[row.place(i)] as u16, Ordering::Relaxed);
+                    }
+                }
+                _ => {}
+            }
+        }
     }
 }
 
-fn each_pixel(
-    view: &TextureView<'_>,
-    x: u32,
-    y: u32,
-    region: &Region,
-    mut visit: impl FnMut(usize, usize),
-) {
-    let Some(&Level { width, start, .. }) = view.levels.first() else {
-        return;
-    };
-    for row in y.max(region.y[0])..(y + TILE).min(region.y[1]) {
-        for column in x.max(region.x[0])..(x + TILE).min(region.x[1]) {
-            let index = start as usize + row as usize * width as usize + column as usize;
-            visit(place(column - x, row - y), index);
+/// Neighbouring pixels of a tile's row.
+struct Row {
+    /// Their texels.
+    texels: std::ops::Range<usize>,
+    /// The first one in the tile.
+    column: usize,
+    row: usize,
+}
+
+impl Row {
+    /// Where the pixel `i` of them is in [`TileDepth`].
+    #[inline(always)]
+    fn place(&self, i: usize) -> usize {
+        let column = self.column + i;
+        let start = (self.row / 2 * (TILE as usize / 2) * 2 + self.row % 2) * 2;
+        // Always below; so that nobody has to check.
+        (start + column / 2 * 4 + column % 2) % PIXELS
+    }
+}
+
+/// The rows of a region that are in a tile.
+struct Rows {
+    start: usize,
+    width: usize,
+    x: [u32; 2],
+    y: std::ops::Range<u32>,
+    tile: [u32; 2],
+}
+
+impl Rows {
+    fn new(view: &TextureView<'_>, x: u32, y: u32, region: &Region) -> Self {
+        let level = view.levels.first().copied().unwrap_or_default();
+        Self {
+            start: level.start as usize,
+            width: level.width as usize,
+            x: [x.max(region.x[0]), (x + TILE).min(region.x[1])],
+            y: y.max(region.y[0])..(y + TILE).min(region.y[1]),
+            tile: [x, y],
         }
+    }
+}
+
+impl Iterator for Rows {
+    type Item = Row;
+
+    fn next(&mut self) -> Option<Row> {
+        let row = self.y.next()?;
+        let first = self.start + row as usize * self.width;
+        let [x, end] = self.x;
+        Some(Row {
+            texels: first + x as usize..first + end as usize,
+            column: (x - self.tile[0]) as usize,
+            row: (row - self.tile[1]) as usize,
+        })
     }
 }
 

@@ -625,7 +625,10 @@ impl TileWorker<'_> {
             }
         }
         self.quads = quads;
-        if let Some(view) = depth {
+        let tests = [shared.tests.early, shared.tests.late];
+        if let Some(view) = depth
+            && tests.iter().flatten().any(|test| test.write)
+        {
             self.depth.store(view, x, y, &shared.region);
         }
         self.widen(x, y);

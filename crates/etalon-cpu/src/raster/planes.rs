@@ -1,7 +1,7 @@
 //! From clip space to pixels, and the planes that numbers of a triangle lie in.
 //!
-//! Everything here is `f32`, and the order of operations is llvmpipe's (Mesa 22.3
-//! to 25), so that depths come out with the same bits as on lavapipe:
+//! Everything here is `f32`, and the order of operations is llvmpipe's (Mesa's sources
+//! of May 2023), so that depths can come out with the same bits as on lavapipe:
 //!
 //! * `draw_llvm.c`, `generate_viewport`: `1 / w` first, then `x · (1 / w)`, then a
 //!   fused multiply-add with half of the viewport's size and its centre. Vulkan 1.3
@@ -16,8 +16,8 @@
 //!   fused (`llvm.fmuladd`, on processors that have it); the depth bias is added
 //!   last. What is interpolated with perspective is multiplied by `1 / (1 / w)`.
 //!
-//! Planes of everything but depth are kept around the first corner, as Mesa does
-//! from 26 on: nothing is compared bit by bit there, and no digits get lost.
+//! Planes of everything but depth are kept around the first corner, as later versions
+//! of Mesa do with all: no digits get lost that way.
 
 use etalon_core::raster::{DepthBias, SUB_PIXEL_BITS, Viewport};
 

@@ -9,6 +9,7 @@ mod axis;
 mod cube;
 mod gather;
 mod general;
+mod levels;
 mod lod;
 
 use etalon_core::Format;
@@ -322,7 +323,11 @@ impl<'a> Request<'a> {
                     }
                 }
                 let mut both = sum;
-                self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
+                if self.axes == 2 && !self.cube {
+                    self.add_levels::<I, K>(&levels, linear, &scale, place, &mut both);
+                } else {
+                    self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
+                }
                 for (sum, both) in sum.iter_mut().zip(&both) {
                     for k in 0..K {
                         // A lane that reads one level only must not see the other.

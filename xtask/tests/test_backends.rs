@@ -73,8 +73,7 @@ fn backends_agree_and_faults_are_found_where_they_were_planted() {
     assert!(report["comparisons"].as_array().unwrap().len() > 30);
 
     // A constant changed by one part in 1024, in one kernel of one executor.
-    let plant =
-        "wgpu/lavapipe=constant:bloom/threshold:(1.0 + luminance(:(1.0009765625 + luminance(";
+    let plant = "wgpu/lavapipe=constant:bloom/threshold:luminance(exposed):luminance(exposed * 1.0009765625)";
     let found = problems(&test_backends(&["--plant", plant]));
     assert!(
         found[0].starts_with("wgpu/lavapipe disagrees with cpu"),

@@ -42,7 +42,7 @@
 //! indices name and that are not there read as whatever WebGPU lets them.
 //!
 //! WebGPU draws to colours of as many numbers as the target has channels, or
-//! more, and to no 3D textures; other draws are refused.
+//! more; other draws are refused.
 //!
 //! # What is kept between frames
 //! Pipelines are kept by kernel, those of draws also by their state, vertex

@@ -9,7 +9,6 @@ use etalon_core::plan::{
     DrawExtent, PlannedDraw, PlannedStep, PlannedTarget, PlannedVertices, RasterStep, Usage,
 };
 use etalon_core::raster::{IndexFormat, NumberKind, StepMode};
-use etalon_core::resource::Dimension;
 
 use super::Checker;
 use crate::error::{malformed, unsupported};
@@ -154,10 +153,6 @@ impl Checker<'_> {
                 "{who} cannot draw to {target:?}, of {}",
                 convert::describe(&desc)
             )));
-        }
-        if desc.dimension == Dimension::D3 {
-            let what = "a target that is a slice of a 3D texture".to_owned();
-            return Err(unsupported(&step.name, what));
         }
         let format = convert::format(desc.format).unwrap_or_default();
         let offered = self.format_features(format).optimal_tiling_features;

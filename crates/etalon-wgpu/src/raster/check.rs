@@ -14,7 +14,6 @@ use etalon_core::plan::{
     DrawExtent, PlannedDraw, PlannedIndices, PlannedTarget, PlannedVertices, RasterStep,
 };
 use etalon_core::raster::{MAX_COLOUR_TARGETS, NumberKind, StepMode, TargetState, Topology};
-use etalon_core::resource::Dimension;
 
 use super::{convert, does_nothing};
 use crate::check::Checker;
@@ -93,9 +92,6 @@ fn target(
             step.size,
             if is_depth { "depth" } else { "colour" }
         )));
-    }
-    if desc.dimension == Dimension::D3 {
-        return Err(checker.unsupported("draws to 3D textures"));
     }
     let raw = match checker.gpu.format(format) {
         Some((raw, features))

@@ -385,6 +385,7 @@ fn targets_are_held_against_each_other() {
     let mut graph = Graph::new();
     let parts = parts(&mut graph);
     let small = graph.texture("small", TextureDesc::d2(32, 48, Format::Rgba8Unorm));
+    let volume = graph.texture("volume", TextureDesc::d3(4, 4, 4, Format::Rgba8Unorm));
     let snorm = graph.texture("snorm", TextureDesc::d2(64, 48, Format::Rgba8Snorm));
     let mut refused =
         |declare: &dyn Fn(crate::graph::RasterPass<'_>) -> Result<Written, GraphError>,
@@ -404,6 +405,10 @@ fn targets_are_held_against_each_other() {
     refused(
         &|pass| pass.colour("a", snorm, CLEAR).finish(),
         "renderable",
+    );
+    refused(
+        &|pass| pass.colour("a", volume, CLEAR).finish(),
+        "targets are 2D",
     );
     refused(
         &|pass| pass.colour("a", parts.depth, CLEAR).finish(),

@@ -7,7 +7,6 @@ use etalon_core::backend::{Backend, BackendError, Inputs};
 use etalon_core::graph::{Buffer, ClearValue, Draw, Load, ResourceDesc};
 use etalon_core::plan::{Capture, DrawExtent, Plan, RasterStep, Step};
 use etalon_core::raster::{Blend, DepthState, IndexFormat, RasterState, TargetState, VertexFormat};
-use etalon_core::resource::TextureDesc;
 use etalon_wgpu::WgpuBackend;
 
 #[test]
@@ -242,22 +241,5 @@ fn targets_over_the_limits_are_refused() {
             Ok(_) => assert!(most >= 128),
             Err(error) => unsupported(&error, "bytes a pixel"),
         }
-    });
-}
-
-#[test]
-fn slices_of_3d_textures_are_no_targets() {
-    on_vulkan(|backend| {
-        let mut scene = Scene::default();
-        let desc = TextureDesc::d3(4, 4, 4, Format::Rgba8Unorm);
-        let target = scene.graph.texture("volume", desc);
-        let pass = scene.graph.raster("draws").colour("colour", target, CLEAR);
-        let written = pass.finish().unwrap();
-        let image = written.texture("colour").unwrap();
-        scene.graph.output("image", image).unwrap();
-        unsupported(
-            &scene.attempt(backend, &kernels()).unwrap_err(),
-            "3D textures",
-        );
     });
 }

@@ -47,11 +47,7 @@ fn scenes(size: FrameSize) -> Vec<Scene> {
     models().iter().map(scene).collect()
 }
 
-fn draw(
-    executor: &mut dyn Backend,
-    scene: &Scene,
-    size: FrameSize,
-) -> Execution {
+fn draw(executor: &mut dyn Backend, scene: &Scene, size: FrameSize) -> Execution {
     let drawable = Drawable::new(&scene.model).unwrap();
     let mut graph = Graph::new();
     let items = drawable.import(&mut graph).unwrap();

@@ -3,12 +3,13 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use etalon_core::Format;
 use etalon_core::backend::BackendError;
-use etalon_core::graph::ResourceDesc;
-use etalon_core::kernel::{Kernel, KernelId};
-use etalon_core::plan::{DrawExtent, Plan, PlannedDraw, PlannedTarget, RasterStep};
-use etalon_core::raster::{RasterState, VertexAttribute, VertexLayout};
+use etalon_core::kernel::Kernel;
+use etalon_core::plan::{
+    DrawExtent, DrawForm, Plan, PlannedAttribute, PlannedDraw, PlannedLayout, PlannedTarget,
+    RasterStep,
+};
+use etalon_core::raster::{VertexAttribute, VertexLayout};
 
 use super::histories::clear_texel;
 use super::resources::Resources;
@@ -18,79 +19,41 @@ use crate::raster::{
     DrawRange, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram, VertexBuffer,
 };
 
-/// What makes a program of a kernel: everything that its code depends on.
-#[derive(Clone, Debug, PartialEq)]
-struct Form {
-    layouts: Vec<VertexLayout>,
-    state: RasterState,
-    colours: Vec<Format>,
-    depth: Option<Format>,
-}
-
-/// The programs of all kernels that draw.
+/// The programs of all draws, by what makes them.
 #[derive(Debug, Default)]
-pub(super) struct RasterPrograms(HashMap<KernelId, Vec<(Form, RasterProgram)>>);
-
-impl RasterPrograms {
-    fn find(&self, kernel: KernelId, form: &Form) -> Option<&RasterProgram> {
-        let made = self.0.get(&kernel)?;
-        made.iter()
-            .find_map(|(of, program)| (of == form).then_some(program))
-    }
-}
-
-fn format(plan: &Plan, step: &str, target: &PlannedTarget) -> Result<Format, BackendError> {
-    match plan
-        .resources
-        .get(target.resource as usize)
-        .map(|planned| &planned.desc)
-    {
-        Some(ResourceDesc::Texture(desc)) => Ok(desc.format),
-        _ => Err(malformed(step, "a target is no texture")),
-    }
-}
+pub(super) struct RasterPrograms(HashMap<DrawForm, RasterProgram>);
 
 fn form(
     plan: &Plan,
     step: &str,
     raster: &RasterStep,
     draw: &PlannedDraw,
-) -> Result<Form, BackendError> {
-    let stages = draw.kernel.0.raster();
-    let stages = stages.ok_or_else(|| malformed(step, "a draw's kernel does not draw"))?;
-    let name = |location: u32| {
-        let mut inputs = stages.vertex.inputs.iter();
-        inputs.find(|input| input.location == location)
-    };
-    let layouts = draw.vertices.iter().map(|vertices| VertexLayout {
-        stride: vertices.stride,
-        step: vertices.step,
-        attributes: vertices
-            .attributes
+) -> Result<DrawForm, BackendError> {
+    let form = DrawForm::new(plan, raster, draw);
+    form.ok_or_else(|| malformed(step, "a target is no texture"))
+}
+
+/// What feeds a vertex kernel, by the names of its inputs.
+fn layouts(kernel: &Kernel, form: &DrawForm) -> Vec<VertexLayout> {
+    let inputs = kernel
+        .raster()
+        .map_or(&[][..], |stages| stages.vertex.inputs.as_slice());
+    let attribute = |attribute: &PlannedAttribute| {
+        let input = inputs
             .iter()
-            .filter_map(|attribute| {
-                Some(VertexAttribute {
-                    name: name(attribute.location)?.name.clone().into(),
-                    format: attribute.format,
-                    offset: attribute.offset,
-                })
-            })
-            .collect(),
-    });
-    let colours = raster
-        .colours
-        .iter()
-        .map(|target| format(plan, step, target));
-    Ok(Form {
-        layouts: layouts.collect(),
-        state: draw.state.clone(),
-        colours: colours.collect::<Result<_, _>>()?,
-        depth: raster
-            .depth
-            .as_ref()
-            .map(|target| format(plan, step, target))
-            .transpose()?,
-    })
+            .find(|input| input.location == attribute.location)?;
+        Some(VertexAttribute {
+            name: input.name.clone().into(),
+            format: attribute.format,
+            offset: attribute.offset,
+        })
+    };
+    let layout = |layout: &PlannedLayout| VertexLayout {
+        stride: layout.stride,
+        step: layout.step,
+        attributes: layout.attributes.iter().filter_map(attribute).collect(),
+    };
+    form.vertices.iter().map(layout).collect()
 }
 
 fn failed(step: &str, error: RasterError) -> BackendError {
@@ -105,7 +68,7 @@ fn failed(step: &str, error: RasterError) -> BackendError {
     }
 }
 
-fn translate(kernel: &Arc<Kernel>, form: &Form) -> Result<RasterProgram, RasterError> {
+fn translate(kernel: &Arc<Kernel>, form: &DrawForm) -> Result<RasterProgram, RasterError> {
     let source = Arc::clone(kernel);
     let locate = move |span| {
         let place = source.source_map.locate(span);
@@ -128,7 +91,7 @@ fn translate(kernel: &Arc<Kernel>, form: &Form) -> Result<RasterProgram, RasterE
     let desc = RasterDesc {
         vertex,
         fragment,
-        layouts: &form.layouts,
+        layouts: &layouts(kernel, form),
         state: &form.state,
         colours: &form.colours,
         depth: form.depth,
@@ -148,15 +111,20 @@ impl CpuBackend {
         for draw in &raster.draws {
             let form = form(plan, step, raster, draw)?;
             let kernel = &draw.kernel.0;
-            if self.raster_programs.find(kernel.id, &form).is_none() {
-                let program = translate(kernel, &form).map_err(|error| failed(step, error))?;
-                let made = self.raster_programs.0.entry(kernel.id).or_default();
-                if made.is_empty() {
-                    self.counters.kernels += 1;
-                }
-                made.push((form, program));
-                self.counters.pipelines += 1;
+            if self.raster_programs.0.contains_key(&form) {
+                continue;
             }
+            let program = translate(kernel, &form).map_err(|error| failed(step, error))?;
+            if !self
+                .raster_programs
+                .0
+                .keys()
+                .any(|made| made.kernel == kernel.id)
+            {
+                self.counters.kernels += 1;
+            }
+            self.counters.pipelines += 1;
+            self.raster_programs.0.insert(form, program);
         }
         Ok(())
     }
@@ -186,7 +154,7 @@ impl CpuBackend {
         let depth = raster.depth.as_ref().map(view).transpose()?;
         for draw in &raster.draws {
             let form = form(plan, name, raster, draw)?;
-            let program = self.raster_programs.find(draw.kernel.0.id, &form);
+            let program = self.raster_programs.0.get(&form);
             let program =
                 program.ok_or_else(|| malformed(name, "a draw's kernel was not translated"))?;
             let kernel = &draw.kernel.0;

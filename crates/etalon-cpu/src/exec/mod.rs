@@ -38,7 +38,7 @@ pub use tier::Tier;
 
 pub(crate) use check::{Detail, Found, Part, Shadow, Site};
 pub(crate) use dispatch::{DispatchFailure, Job};
-pub(crate) use fused::{Fused, Software};
+pub(crate) use fused::Fused;
 pub(crate) use isa::Isa;
 pub(crate) use lanes::Operands;
 pub(crate) use link::Linked;

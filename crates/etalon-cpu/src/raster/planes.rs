@@ -26,13 +26,6 @@ use crate::exec::Fused;
 /// Units of fixed-point positions in a pixel.
 pub(super) const SUB_PIXELS: i32 = 1 << SUB_PIXEL_BITS;
 
-/// Corners lie from here to [`GUARD_END`], in pixels; triangles that reach further
-/// are clipped. The largest target is in the middle of it. Twice the extent times
-/// the pixels of a tile must be within the integers of [`super::tile`].
-pub(super) const GUARD_START: f32 = -8192.0;
-/// See [`GUARD_START`].
-pub(super) const GUARD_END: f32 = 24576.0;
-
 /// The largest target along an axis, in pixels.
 pub(super) const MAX_TARGET: u32 = 16384;
 
@@ -78,6 +71,18 @@ impl ViewportMap {
             x: F::mul_add(x * w, self.scale[0], self.offset[0]),
             y: F::mul_add(y * w, self.scale[1], self.offset[1]),
             z: F::mul_add(z * w, self.scale[2], self.offset[2]),
+            w,
+        }
+    }
+
+    /// The corner of a vertex that clipping made, whose products and sums llvmpipe does
+    /// not fuse.
+    pub(super) fn cut_corner(&self, [x, y, z, w]: [f32; 4]) -> Corner {
+        let w = 1.0 / w;
+        Corner {
+            x: x * w * self.scale[0] + self.offset[0],
+            y: y * w * self.scale[1] + self.offset[1],
+            z: z * w * self.scale[2] + self.offset[2],
             w,
         }
     }

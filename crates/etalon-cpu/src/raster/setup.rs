@@ -5,15 +5,13 @@ use std::sync::{Mutex, PoisonError};
 use etalon_core::Format;
 use etalon_core::raster::{CullMode, DepthBias, FrontFace};
 
-use super::clip::{MAX_VERTICES, clip};
+use super::clip::{MAX_CUTS, Polygon};
 use super::error::RasterError;
 use super::indices::Assembly;
-use super::planes::{
-    Corner, GUARD_END, GUARD_START, Gradients, Plane, SUB_PIXELS, Shape, ViewportMap, snap,
-};
-use super::vertex::{BAD, CORNER, FAR, FLAGS, GUARD, HEAD, NEAR, SIDES, Vertices};
+use super::planes::{Corner, Gradients, MAX_TARGET, Plane, SUB_PIXELS, Shape, ViewportMap, snap};
+use super::vertex::{BAD, CORNER, FLAGS, HEAD, Vertices};
 use super::{RasterProgram, StageOutput};
-use crate::exec::{Executor, Software};
+use crate::exec::Executor;
 use crate::ir::{Interpolation, StageInput};
 
 /// Pixels of a tile along each axis.
@@ -136,6 +134,12 @@ struct Given<'a> {
     words: [&'a [u32]; 3],
 }
 
+/// Where a vertex is in the picture.
+fn corner_of(words: &[u32]) -> Corner {
+    let [x, y, z, w] = [0, 1, 2, 3].map(|axis| f32::from_bits(words[CORNER + axis]));
+    Corner { x, y, z, w }
+}
+
 impl RasterProgram {
     /// Makes some triangles ready, by their numbers over the instances of `setup`.
     pub(super) fn triangles(
@@ -248,27 +252,22 @@ impl<'a> ChunkBuilder<'a> {
     fn triangle(&mut self, given: &Given<'a>) -> Result<(), RasterError> {
         let [f0, f1, f2] = given.words.map(|words| words[FLAGS]);
         let (all, any) = (f0 & f1 & f2, f0 | f1 | f2);
-        let outside = NEAR | FAR | SIDES.iter().fold(0, |all, side| all | side);
-        if any & BAD != 0 || all & outside != 0 {
+        if any & BAD != 0 || all != 0 {
             return Ok(());
         }
-        if any & (NEAR | FAR | GUARD) != 0 {
-            return self.clipped(given);
+        if any != 0 {
+            return self.clipped(given, any);
         }
-        let corners = given.words.map(|words| Corner {
-            x: f32::from_bits(words[CORNER]),
-            y: f32::from_bits(words[CORNER + 1]),
-            z: f32::from_bits(words[CORNER + 2]),
-            w: f32::from_bits(words[CORNER + 3]),
-        });
+        let corners = given.words.map(corner_of);
         self.visible(corners, given.vertices, given.vertices[0])
     }
 
-    fn clipped(&mut self, given: &Given<'a>) -> Result<(), RasterError> {
+    /// A triangle that reaches beyond some of the planes.
+    fn clipped(&mut self, given: &Given<'a>, planes: u32) -> Result<(), RasterError> {
         let positions = given
             .words
             .map(|words| [0, 1, 2, 3].map(|axis| f32::from_bits(words[axis])));
-        let polygon = clip(&positions, self.setup.map);
+        let polygon = Polygon::clipped(positions, planes, self.setup.map);
         let vertices = polygon.vertices();
         if vertices.len() < 3 {
             return Ok(());
@@ -276,31 +275,41 @@ impl<'a> ChunkBuilder<'a> {
         let stride = self.setup.vertices.stride;
         let first = self.chunk.cut.len() / stride;
         self.program
-            .reserve(&mut self.chunk.cut, vertices.len() * stride)?;
-        let mut corners = [Corner::default(); MAX_VERTICES];
-        for (vertex, corner) in vertices.iter().zip(&mut corners) {
-            let position = vertex.position.map(|axis| axis as f32);
-            *corner = self.setup.map.corner::<Software>(position);
+            .reserve(&mut self.chunk.cut, polygon.cuts().len() * stride)?;
+        let mut corners = [Corner::default(); 3 + MAX_CUTS];
+        for (corner, words) in corners.iter_mut().zip(given.words) {
+            *corner = corner_of(words);
+        }
+        for (corner, cut) in corners[3..].iter_mut().zip(polygon.cuts()) {
+            *corner = self
+                .setup
+                .map
+                .cut_corner(cut.position.map(|axis| axis as f32));
             self.chunk.cut.extend([0; HEAD]);
             for (i, interpolation) in self.interpolations.iter().enumerate() {
-                let mut sum = 0.0;
-                for (k, words) in given.words.iter().enumerate() {
-                    let mut weight = vertex.weights[k];
-                    if *interpolation == Interpolation::Linear {
-                        // In the picture it is the share of w.
-                        weight *= f64::from(positions[k][3]) / vertex.position[3];
-                    }
-                    if weight != 0.0 {
-                        sum += weight * f64::from(f32::from_bits(words[HEAD + i]));
-                    }
-                }
-                self.chunk.cut.push((sum as f32).to_bits());
+                let number = |vertex: u8| {
+                    let word = match usize::from(vertex) {
+                        own @ 0..3 => given.words[own].get(HEAD + i),
+                        made => self.chunk.cut.get((first + made - 3) * stride + HEAD + i),
+                    };
+                    f32::from_bits(word.copied().unwrap_or(0))
+                };
+                let share = match interpolation {
+                    Interpolation::Linear => cut.linear_share,
+                    _ => cut.share,
+                };
+                let number = polygon.between(number(cut.from), number(cut.to), share);
+                self.chunk.cut.push(number.to_bits());
             }
         }
-        for i in 1..vertices.len() - 1 {
-            let fan = [0, i, i + 1];
-            let numbers = fan.map(|at| (first + at) as u32 | CUT);
-            self.visible(fan.map(|at| corners[at]), numbers, given.vertices[0])?;
+        let number = |vertex: u8| match usize::from(vertex) {
+            own @ 0..3 => given.vertices[own],
+            made => (first + made - 3) as u32 | CUT,
+        };
+        for pair in vertices[1..].windows(2) {
+            let fan = [vertices[0], pair[0], pair[1]];
+            let corners = fan.map(|vertex| corners[usize::from(vertex)]);
+            self.visible(corners, fan.map(number), given.vertices[0])?;
         }
         Ok(())
     }
@@ -312,8 +321,8 @@ impl<'a> ChunkBuilder<'a> {
         mut vertices: [u32; 3],
         provoking: u32,
     ) -> Result<(), RasterError> {
-        // A pixel of room for cuts that are rounded.
-        let (low, high) = (GUARD_START - 1.0, GUARD_END + 1.0);
+        // In the viewport but for cuts that are rounded.
+        let (low, high) = (-1.0, (MAX_TARGET + 1) as f32);
         for Corner { x, y, z, w } in corners {
             let inside = |at: f32| low <= at && at <= high;
             if !(inside(x) && inside(y) && z.is_finite() && w.is_finite()) {

@@ -5,10 +5,11 @@ use std::sync::{Mutex, PoisonError};
 
 use etalon_core::raster::{NumberKind, StepMode, VertexFormat};
 
+use super::clip::PLANES;
 use super::error::RasterError;
 use super::indices::Assembly;
 use super::interface::Attribute;
-use super::planes::{GUARD_END, GUARD_START, ViewportMap};
+use super::planes::ViewportMap;
 use super::{DrawRange, RasterProgram, VertexBuffer};
 use crate::exec::{Executor, Fused, Isa, LocalIds, Resource, Stage, StageFailure, Work, work};
 use crate::ir::{StageInput, StageOutput};
@@ -24,16 +25,9 @@ pub(super) const CORNER: usize = 4;
 /// Where the flags are.
 pub(super) const FLAGS: usize = 8;
 
-/// `z < 0`.
-pub(super) const NEAR: u32 = 1;
-/// `z > w`.
-pub(super) const FAR: u32 = 2;
-/// Beyond one of the four sides of the viewport.
-pub(super) const SIDES: [u32; 4] = [4, 8, 16, 32];
-/// Beyond what fixed-point positions can hold.
-pub(super) const GUARD: u32 = 64;
-/// Not finite.
-pub(super) const BAD: u32 = 128;
+/// Flag of positions that are not finite. Below it there is a flag for each of
+/// [`PLANES`], of positions beyond it.
+pub(super) const BAD: u32 = 1 << PLANES.len();
 
 /// What the vertices of some instances came to.
 pub(super) struct Vertices {
@@ -346,19 +340,13 @@ impl Work for Finish<'_, '_> {
             corner[1][k] = at.y;
             corner[2][k] = at.z;
             corner[3][k] = at.w;
-            let guarded = (at.x >= GUARD_START)
-                & (at.x <= GUARD_END)
-                & (at.y >= GUARD_START)
-                & (at.y <= GUARD_END);
             let finite = x.is_finite() & y.is_finite() & z.is_finite() & w.is_finite();
-            let [left, right, bottom, top] = SIDES;
-            flags[k] = crate::num::mask(z < 0.0) & NEAR
-                | crate::num::mask(z > w) & FAR
-                | crate::num::mask(x < -w) & left
-                | crate::num::mask(x > w) & right
-                | crate::num::mask(y < -w) & bottom
-                | crate::num::mask(y > w) & top
-                | crate::num::mask(!guarded) & GUARD
+            flags[k] = crate::num::mask(x > w) & 1
+                | crate::num::mask(x < -w) & 2
+                | crate::num::mask(y > w) & 4
+                | crate::num::mask(y < -w) & 8
+                | crate::num::mask(z < 0.0) & 16
+                | crate::num::mask(z > w) & 32
                 | crate::num::mask(!finite) & BAD;
         }
         for (k, words) in self.words.chunks_exact_mut(self.stride).enumerate() {

@@ -9,7 +9,7 @@ use etalon::graph::{Graph, GraphError};
 use etalon_scenes::exr_frame::{ExrError, ExrOptions, load_exr};
 use etalon_scenes::frame::FrameError;
 use etalon_scenes::model::gltf::{GltfError, GltfOptions, load_gltf};
-use etalon_scenes::model::{ModelError, Shot, ShotError};
+use etalon_scenes::model::{Shot, ShotError};
 use etalon_scenes::scenes::WorldError;
 use etalon_scenes::{Frame, FrameSize, model, models, scene, scenes};
 use thiserror::Error;
@@ -66,12 +66,9 @@ pub enum SourceError {
     /// The scene cannot be rendered.
     #[error(transparent)]
     World(#[from] WorldError),
-    /// The model cannot be made.
+    /// The model cannot be made or drawn.
     #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The model cannot be drawn.
-    #[error(transparent)]
-    Shot(#[from] ShotError),
+    Shot(Box<ShotError>),
     /// The file is no frame that can be read.
     #[error("{}: {source}", path.display())]
     File {
@@ -86,7 +83,7 @@ pub enum SourceError {
         /// The file.
         path: PathBuf,
         /// Why not.
-        source: GltfError,
+        source: Box<GltfError>,
     },
     /// The graph refuses the frame.
     #[error(transparent)]
@@ -94,6 +91,12 @@ pub enum SourceError {
     /// The effect refuses the frame.
     #[error(transparent)]
     Effect(#[from] EffectError),
+}
+
+impl From<ShotError> for SourceError {
+    fn from(error: ShotError) -> Self {
+        Self::Shot(Box::new(error))
+    }
 }
 
 impl Source {
@@ -162,14 +165,15 @@ impl Source {
             }
             Self::Model { name, size } => {
                 let entry = model(name).ok_or_else(|| no_scene(name))?;
-                let shot = Shot::new((entry.build)()?, TIME)?;
+                let model = (entry.build)().map_err(ShotError::from)?;
+                let shot = Shot::new(model, TIME)?;
                 Ok(Content::Shot(Box::new(shot), frame_size(*size)?))
             }
             Self::ModelFile { path, size } => {
                 let model = load_gltf(path, &GltfOptions::default()).map_err(|source| {
                     SourceError::ModelFile {
                         path: path.clone(),
-                        source,
+                        source: Box::new(source),
                     }
                 })?;
                 let shot = Shot::new(model, TIME)?;

@@ -7,7 +7,7 @@ use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
 use super::{check, half, image, memory, sample, stage, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
-use crate::ir::Op;
+use crate::ir::{Input, Op};
 use crate::num::Number;
 
 /// The registers of a simple instruction, and where the whole one is found.
@@ -186,6 +186,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
             varying_result,
             inst.mask.is_some(),
         ),
+        Op::Input(Input::Stage(_)) => Handler::new::<stage::StageInputStep>(tier),
         Op::Input(_) if varying_result => Handler::new::<memory::InputStep>(tier),
         Op::Input(_) => Handler::plain::<memory::InputStep>(),
         Op::Table { .. } => memory::table(tier, varying_result),

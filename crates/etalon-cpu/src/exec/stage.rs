@@ -8,8 +8,8 @@ use super::memory::rounds;
 use super::profile::Unwatched;
 use super::state::{Failure, LocalIds, Resource, State};
 use super::tier::{Handler, Step, Tier, TieredStep};
-use crate::code::{Code, Slot};
-use crate::ir::Op;
+use crate::code::Code;
+use crate::ir::{Input, Op};
 use crate::num::Number;
 use crate::registers::LANES;
 
@@ -88,12 +88,26 @@ impl<'a> Stage<'a> {
 }
 
 /// Copies what an input's slot holds.
-#[inline(always)]
-pub(super) fn input<N: Number>(state: &mut State<'_, N>, to: Slot, slot: u16) {
-    for chunk in 0..state.chunks {
-        let at = usize::from(slot) * state.stage.chunks + chunk;
-        let lanes = state.stage.inputs[at].0;
-        state.set_bits(to, chunk, &lanes);
+pub(super) struct StageInputStep;
+
+impl<N: Number> Step<N> for StageInputStep {
+    #[inline(always)]
+    fn run(state: &mut State<'_, N>, instr: &Instr) {
+        let inst = state.inst(instr.index);
+        let (Op::Input(Input::Stage(slot)), Some(Some(to))) =
+            (inst.op, inst.results.first().copied())
+        else {
+            return;
+        };
+        let first = usize::from(slot) * state.stage.chunks;
+        if !to.varying {
+            let lanes = state.stage.inputs[first].0;
+            return state.set_bits(to, 0, &lanes);
+        }
+        for chunk in 0..state.chunks {
+            let lanes = state.stage.inputs[first + chunk].0;
+            state.set_bits(to, chunk, &lanes);
+        }
     }
 }
 

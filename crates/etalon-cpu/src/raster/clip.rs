@@ -193,21 +193,27 @@ impl Polygon {
 
     fn make(&mut self, from: u8, to: u8, share: f64) -> Option<u8> {
         let arithmetic = self.arithmetic;
-        let round = |value| arithmetic.rounded(value);
         let (start, end) = (self.position(from), self.position(to));
         let mut position = [0.0; 4];
         for (axis, position) in position.iter_mut().enumerate() {
             *position = arithmetic.between(start[axis], end[axis], share);
         }
-        let mut linear_share = share;
-        if let Some(axis) = (0..2).find(|&axis| start[axis] != end[axis]) {
-            let place = |position: [f64; 4]| round(position[axis] / position[3]);
-            let (way, length) = (
-                round(place(position) - place(start)),
-                round(place(end) - place(start)),
-            );
-            linear_share = round(way / length);
-        }
+        // Along the axis on which the ends are further from each other in the picture.
+        let along = |axis: usize| {
+            let place = |position: [f64; 4]| position[axis] / position[3];
+            [position, end].map(|to| place(to) - place(start))
+        };
+        let [[x, width], [y, height]] = [along(0), along(1)];
+        let linear_share = if width.abs() >= height.abs() {
+            x / width
+        } else {
+            y / height
+        };
+        let linear_share = if linear_share.is_finite() {
+            linear_share
+        } else {
+            share
+        };
         *self.cuts.get_mut(self.made)? = Cut {
             position,
             from,

@@ -1,4 +1,5 @@
-//! Draws a model with every effect, and writes what each step gave as PNG files.
+//! Draws a model with every effect, and writes what each step gave as PNG files:
+//! lit by the G-buffer and lit as it is drawn, with glass over the latter.
 //!
 //! ```text
 //! cargo run --release -p etalon-tests --example draw_model -- gallery out/ ash
@@ -8,13 +9,20 @@
 use std::error::Error;
 use std::path::Path;
 
+use etalon::Format;
 use etalon::backend::Backend;
+use etalon::effects::environment::{
+    EnvironmentMap, Prefilter, Surroundings, environment, mirroring,
+};
+use etalon::effects::forward::{Lamps, Lighting, forward, glass, lamp_bytes};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
-use etalon::effects::lighting::{LightKind, PunctualLight, Surroundings, lighting};
+use etalon::effects::lighting::{LightKind, PunctualLight, lighting};
 use etalon::effects::{ChainSettings, SceneInputs, chain};
 use etalon::graph::Graph;
+use etalon::image::{ImageData, ImageError};
 use etalon::kernel::{Arithmetic, KernelLibrary};
 use etalon::plan::Capture;
+use etalon::resource::TextureDesc;
 use etalon_scenes::model::gltf::{GltfOptions, load_gltf};
 use etalon_scenes::model::{Drawable, Model, Snapshot, lights, view};
 use etalon_scenes::picture::{Look, write_png};
@@ -52,7 +60,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let view = view(&camera, size)?;
     let drawable = Drawable::new(&model)?;
     let mut graph = Graph::new();
-    let items = drawable.import(&mut graph)?.opaque_items(&model, &snapshot);
+    let imported = drawable.import(&mut graph)?;
+    let items = imported.opaque_items(&model, &snapshot);
+    let blended = imported.blended_items(&model, &snapshot, camera.pose().position());
     let geometry = Geometry {
         items: &items,
         view,
@@ -70,14 +80,33 @@ fn main() -> Result<(), Box<dyn Error>> {
             reach: None,
         });
     }
+    let studio = EnvironmentMap::of_equirectangular(&studio()?, 256)?;
+    let base = graph.import_texture("studio", studio.image().desc)?;
+    let settings = Prefilter::default();
+    let around = environment(&mut graph, base, studio.irradiance(), &settings)?;
     let surroundings = Surroundings {
-        above: Vec3::new(0.5, 0.6, 0.8),
-        below: Vec3::splat(0.15),
         background: Vec3::new(0.05, 0.06, 0.08),
+        environment: Some(around),
+        mirroring: Some(mirroring(&mut graph)?),
+        ..Surroundings::default()
     };
     let light = lighting(&mut graph, &view, &surfaces, &lamps, &surroundings)?;
+    let lamp_list = lamp_bytes(&view, &lamps)?;
+    let lit = Lighting {
+        lamps: Lamps::import(&mut graph, "lamps", lamps.len() as u32)?,
+        surroundings,
+    };
+    let shaded = forward(&mut graph, &geometry, Some(&pre), &lit, false)?;
+    // Glass is drawn over it.
+    let copy = graph.texture("opaque", graph.desc(shaded.light));
+    let opaque = graph.copy(shaded.light, copy)?;
+    let panes = Geometry {
+        items: &blended,
+        ..geometry
+    };
+    let whole = glass(&mut graph, &panes, shaded.light, shaded.depth, &lit)?;
     let inputs = SceneInputs {
-        colour: light,
+        colour: whole,
         depth: surfaces.depth,
         normal: surfaces.normal,
         specular: surfaces.specular,
@@ -89,6 +118,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let outputs = [
         ("picture", picture, Look::Plain),
         ("light", light, Look::Colour { exposure: 1.0 }),
+        ("forward", opaque, Look::Colour { exposure: 1.0 }),
+        ("glass", whole, Look::Colour { exposure: 1.0 }),
         ("colour", surfaces.colour, Look::Colour { exposure: 1.0 }),
         ("normal", surfaces.normal, Look::Vectors),
         ("specular", surfaces.specular, Look::Plain),
@@ -99,7 +130,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     let kernels = KernelLibrary::new();
     let fast = Arithmetic::Fast;
     let plan = plan_for(backend.as_ref(), &graph, &kernels, fast, Capture::Outputs)?;
-    let execution = backend.execute(&plan, &drawable.inputs())?;
+    let inputs = drawable.inputs().texture("studio", studio.image());
+    let execution = backend.execute(&plan, &inputs.buffer("lamps", &lamp_list))?;
     let folder = Path::new(folder);
     std::fs::create_dir_all(folder)?;
     for (name, _, look) in outputs {
@@ -110,6 +142,27 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{:10.3} ms  {}", time.nanoseconds as f64 * 1e-6, time.step);
     }
     Ok(())
+}
+
+/// All directions of a room with two windows: what polished things need to look
+/// like polished things.
+fn studio() -> Result<ImageData, ImageError> {
+    let [width, height] = [256, 128];
+    let texels: Vec<[f32; 4]> = (0..width * height)
+        .map(|k| {
+            let u = (k % width) as f32 / width as f32;
+            let v = (k / width) as f32 / height as f32;
+            let wall = Vec3::new(0.35, 0.38, 0.45).lerp(Vec3::new(0.12, 0.1, 0.09), v);
+            let tall = (0.2..0.45).contains(&v);
+            let light = match u {
+                _ if tall && (0.86..0.96).contains(&u) => Vec3::new(6.0, 6.5, 7.0),
+                _ if tall && (0.30..0.36).contains(&u) => Vec3::new(5.0, 4.0, 3.0),
+                _ => wall,
+            };
+            light.extend(1.0).to_array()
+        })
+        .collect();
+    ImageData::from_rgba_f32(TextureDesc::d2(width, height, Format::Rgba32Float), &texels)
 }
 
 /// A camera before all of a model.

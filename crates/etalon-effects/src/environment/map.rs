@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use etalon_core::Format;
 use etalon_core::image::ImageData;
 use etalon_core::resource::TextureDesc;
+use etalon_core::texel::Texel;
 use glam::{DVec2, DVec3};
 
 use super::Irradiance;
@@ -36,8 +37,21 @@ pub(super) fn check_side(side: u32) -> Result<(), SettingError> {
 }
 
 /// Mips down to 16 texels.
-pub(super) fn mips(side: u32) -> u32 {
+fn mips(side: u32) -> u32 {
     side.ilog2() - 3
+}
+
+/// Texels of an image with all mips, as `lib/octahedral` has it.
+pub(super) fn image_size(side: u32) -> [u32; 2] {
+    [side + side / 2, side]
+}
+
+/// The upper left corner of a mip in it.
+fn corner(side: u32, mip: u32) -> [u32; 2] {
+    match mip {
+        0 => [0, 0],
+        _ => [side, side - (side >> (mip - 1))],
+    }
 }
 
 /// The direction at uv of an equirectangular picture.
@@ -89,21 +103,21 @@ impl EnvironmentMap {
             let level = resampled(side >> mip, PARTS, &sample);
             levels.push(level);
         }
-        let desc = TextureDesc {
-            mips: mips(side),
-            ..TextureDesc::d2(side, side, Format::Rgba16Float)
-        };
-        let all = levels.iter().flatten();
-        let all: Vec<_> = all
-            .map(|light| light.as_vec3().extend(1.0).to_array())
-            .collect();
-        Ok(Self {
-            image: ImageData::from_rgba_f32(desc, &all)?,
-            irradiance,
-        })
+        let [width, height] = image_size(side);
+        let desc = TextureDesc::d2(width, height, Format::Rgba16Float);
+        let mut image = ImageData::zeroed(desc)?;
+        for (mip, level) in (0..).zip(&levels) {
+            let ([left, top], own) = (corner(side, mip), side >> mip);
+            for (at, light) in (0..).zip(level) {
+                let [r, g, b] = light.as_vec3().to_array();
+                let texel = Texel::Float([r, g, b, 1.0]);
+                image.set_texel(left + at % own, top + at / own, 0, 0, texel)?;
+            }
+        }
+        Ok(Self { image, irradiance })
     }
 
-    /// The octahedral map with its mips: what [`environment`](super::environment())
+    /// The octahedral map with its mips beside it: what [`environment`](super::environment())
     /// takes as `base` once it is imported.
     #[must_use]
     pub fn image(&self) -> &ImageData {

@@ -90,15 +90,15 @@ impl Prefilter {
     }
 }
 
-/// Blurs the image of an [`EnvironmentMap`], imported as `base`, by roughness: mip 0
-/// is as it is, the last one as seen in the roughest of surfaces.
+/// Blurs the image of an [`EnvironmentMap`], imported as `base`, by roughness: its
+/// largest mip is as it is, the last one as seen in the roughest of surfaces.
 ///
-/// The result is `rgba16float`, of the map's size. The cost is that of `samples`
-/// reads for about half as many texels as the map has; whoever keeps the result
+/// The result is `rgba16float`, of the image's size. The cost is that of `samples`
+/// reads for a third as many texels as the largest mip has; whoever keeps the result
 /// pays it once.
 ///
 /// # Errors
-/// If a setting is out of its range, or `base` is no square with the mips of an
+/// If a setting is out of its range, or `base` is not as large as the image of an
 /// [`EnvironmentMap`].
 pub fn environment(
     graph: &mut Graph,
@@ -108,31 +108,22 @@ pub fn environment(
 ) -> Result<Environment, EffectError> {
     settings.validate()?;
     irradiance.validate()?;
-    let desc = graph.desc(base);
-    let side = desc.extent.width;
-    map::check_side(side)?;
-    let check = Settings("environment");
-    check.count("height", desc.extent.height, side, side)?;
-    check.count("mips", desc.mips, map::mips(side), map::mips(side))?;
-    let mut radiance = graph.texture(
+    let extent = graph.desc(base).extent;
+    map::check_side(extent.height)?;
+    let [width, height] = map::image_size(extent.height);
+    Settings("environment").count("width", extent.width, width, width)?;
+    let radiance = graph.texture(
         "environment radiance",
-        TextureDesc {
-            mips: desc.mips,
-            ..TextureDesc::d2(side, side, Format::Rgba16Float)
-        },
+        TextureDesc::d2(width, height, Format::Rgba16Float),
     );
     let turn = TAU / f64::from(settings.samples);
-    for mip in 0..desc.mips {
-        let roughness = f64::from(mip) / f64::from(desc.mips - 1);
-        radiance = graph
-            .compute("environment/prefilter")
-            .read("source", base)
-            .write("result", radiance.mip(mip))
-            .set("alpha", (roughness * roughness) as f32)
-            .set("samples", settings.samples)
-            .set("turn", Vec2::new(turn.cos() as f32, turn.sin() as f32))
-            .per_texel("result")?;
-    }
+    let radiance = graph
+        .compute("environment/prefilter")
+        .read("source", base)
+        .write("result", radiance)
+        .set("samples", settings.samples)
+        .set("turn", Vec2::new(turn.cos() as f32, turn.sin() as f32))
+        .per_texel("result")?;
     Ok(Environment {
         radiance,
         irradiance: *irradiance,

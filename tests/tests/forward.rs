@@ -22,7 +22,7 @@ use etalon_scenes::model::{
 };
 use etalon_scenes::trace::{TriangleScene, Truth, TruthOptions};
 use etalon_scenes::{Camera, FrameSize, models};
-use etalon_tests::{drawing_executors, plan_for};
+use etalon_tests::{drawing_executors, non_finite, plan_for};
 use glam::{DMat3, DVec3, DVec4, Vec3};
 use shading::{Around, Parts, Point, mirrored_parts};
 use std::f64::consts::{PI, TAU};
@@ -41,6 +41,15 @@ struct Scene {
     size: FrameSize,
     lamps: Vec<PunctualLight>,
     sky: Option<Sky>,
+}
+
+/// How a scene is drawn.
+struct With<'a> {
+    lamps: &'a [PunctualLight],
+    /// Of the lamps, for forward shading.
+    bytes: &'a [u8],
+    arithmetic: Arithmetic,
+    kernels: &'a KernelLibrary,
 }
 
 /// Light from everywhere, `middle + slope · direction` in all, part of it by
@@ -128,6 +137,18 @@ impl Scene {
 
     /// Draws it both ways; `lamps` are lit.
     fn draw(&self, executor: &mut dyn Backend, lamps: &[PunctualLight]) -> Execution {
+        let bytes = lamp_bytes(&self.view(), lamps).unwrap();
+        let with = With {
+            lamps,
+            bytes: &bytes,
+            arithmetic: Arithmetic::Strict,
+            kernels: &KernelLibrary::new(),
+        };
+        self.draw_with(executor, &with)
+    }
+
+    fn draw_with(&self, executor: &mut dyn Backend, with: &With<'_>) -> Execution {
+        let With { lamps, bytes, .. } = *with;
         let drawable = Drawable::new(&self.model).unwrap();
         let mut graph = Graph::new();
         let imported = drawable.import(&mut graph).unwrap();
@@ -153,13 +174,12 @@ impl Scene {
             (surroundings.above, surroundings.below) = (sky.above, sky.below);
             inputs = inputs.texture("sky", sky.map.image());
         }
-        let bytes = lamp_bytes(&geometry.view, lamps).unwrap();
         let lit = Lighting {
             lamps: Lamps::import(&mut graph, "lamps", lamps.len() as u32).unwrap(),
             surroundings,
         };
         if lit.lamps.is_some() {
-            inputs = inputs.buffer("lamps", &bytes);
+            inputs = inputs.buffer("lamps", bytes);
         }
         let pre = prepass(&mut graph, &geometry, false).unwrap();
         let g = gbuffer(&mut graph, &geometry, Some(&pre)).unwrap();
@@ -187,9 +207,8 @@ impl Scene {
         ] {
             graph.output(name, texture).unwrap();
         }
-        let kernels = KernelLibrary::new();
-        let (strict, capture) = (Arithmetic::Strict, Capture::Outputs);
-        let plan = plan_for(executor, &graph, &kernels, strict, capture).unwrap();
+        let capture = Capture::Outputs;
+        let plan = plan_for(executor, &graph, with.kernels, with.arithmetic, capture).unwrap();
         executor.execute(&plan, &inputs).unwrap()
     }
 
@@ -331,6 +350,69 @@ fn surfaces_are_lit_as_the_model_says() {
     }
 }
 
+/// Fast kernels filter with the device's weights, of eight bits: a 256th of what two
+/// texels of the table or the map differ by, which is less than what those are off.
+#[test]
+fn fast_kernels_light_alike() {
+    let size = FrameSize::new(120, 68).unwrap();
+    let scene = &scenes(size)[0];
+    let expected = expected(scene);
+    let bytes = lamp_bytes(&scene.view(), &scene.lamps).unwrap();
+    for executor in &mut executors() {
+        let with = With {
+            lamps: &scene.lamps,
+            bytes: &bytes,
+            arithmetic: Arithmetic::Fast,
+            kernels: &KernelLibrary::new(),
+        };
+        let worst = worst(&expected, &scene.draw_with(executor.as_mut(), &with));
+        assert!(worst <= 1.0, "{worst} on {}", executor.info());
+    }
+}
+
+/// Whatever bits a list of lamps has, light is finite.
+#[test]
+fn no_lamp_makes_light_that_is_no_number() {
+    let size = FrameSize::new(64, 36).unwrap();
+    let scene = &scenes(size)[0];
+    let patterns = [
+        0xffff_ffff_u32,
+        0x7f80_0000,
+        0xff7f_ffff,
+        0x7fc0_0001,
+        0x0000_0001,
+    ];
+    for executor in &mut executors() {
+        for (arithmetic, pattern) in [Arithmetic::Strict, Arithmetic::Fast]
+            .into_iter()
+            .flat_map(|arithmetic| patterns.map(|pattern| (arithmetic, pattern)))
+        {
+            let count = scene.lamps.len();
+            let bytes: Vec<u8> = (0..16 * count as u32)
+                .flat_map(|word| {
+                    if word % 3 == 0 {
+                        1.0_f32.to_bits()
+                    } else {
+                        pattern
+                    }
+                    .to_le_bytes()
+                })
+                .collect();
+            let with = With {
+                lamps: &scene.lamps,
+                bytes: &bytes,
+                arithmetic,
+                kernels: &KernelLibrary::new(),
+            };
+            let drawn = scene.draw_with(executor.as_mut(), &with);
+            for name in ["light", "glass"] {
+                let found = non_finite(drawn.output(name).unwrap());
+                assert_eq!(found, 0, "{name}, {pattern:x} on {}", executor.info());
+            }
+        }
+    }
+}
+
 /// The comparison must be able to fail: a sky a little darker, and a lamp moved by
 /// two centimetres.
 #[test]
@@ -364,28 +446,64 @@ fn light_as_drawn_is_that_of_the_light_map() {
     for scene in &scenes(size) {
         for executor in &mut executors() {
             let drawn = scene.draw(executor.as_mut(), &scene.lamps);
-            let (mut count, mut worst) = (0, 0_f64);
-            for (x, y) in pixels(size) {
-                let [a, b] = ["light map", "light"].map(|name| texel(&drawn, name, x, y));
-                let colour = texel(&drawn, "colour", x, y);
-                if colour.w == 0.0 {
-                    // Both show what is behind everything.
-                    assert_eq!(a, b, "{x}, {y}");
-                    continue;
-                }
-                if (x + 3 * y) % 37 != 0 {
-                    continue;
-                }
-                let allowed = of_storage(scene, &drawn, x, y);
-                let off = (a - b).truncate().abs() / allowed;
-                worst = worst.max(off.max_element());
-                count += 1;
-            }
+            let (count, worst) = apart(scene, &drawn);
             let who = format!("{} on {}: {count}, {worst}", scene.name, executor.info());
             println!("{who}");
             assert!(count > 100 && worst <= 1.0, "{who}");
         }
     }
+}
+
+/// The comparison must be able to fail: a hundredth of what is scattered left out.
+#[test]
+fn a_light_map_of_other_light_is_told_apart() {
+    let size = FrameSize::new(100, 56).unwrap();
+    let scene = &scenes(size)[0];
+    let mut kernels = KernelLibrary::new();
+    let shade = kernels.source("forward/shade").unwrap().to_string();
+    let changed = shade.replacen(
+        "seen.emission + scattered +",
+        "seen.emission + 0.99 * scattered +",
+        1,
+    );
+    assert_ne!(shade, changed);
+    kernels.add_source("forward/shade", &changed);
+    let bytes = lamp_bytes(&scene.view(), &scene.lamps).unwrap();
+    let mut executors = executors();
+    let Some(executor) = executors.first_mut() else {
+        return;
+    };
+    let with = With {
+        lamps: &scene.lamps,
+        bytes: &bytes,
+        arithmetic: Arithmetic::Strict,
+        kernels: &kernels,
+    };
+    let (_, worst) = apart(scene, &scene.draw_with(executor.as_mut(), &with));
+    assert!(worst > 1.2, "{worst}");
+}
+
+/// How many pixels of surfaces are compared, and the largest distance between light
+/// map and forward light, in units of what is allowed.
+fn apart(scene: &Scene, drawn: &Execution) -> (usize, f64) {
+    let (mut count, mut worst) = (0, 0_f64);
+    for (x, y) in pixels(scene.size) {
+        let [a, b] = ["light map", "light"].map(|name| texel(drawn, name, x, y));
+        let colour = texel(drawn, "colour", x, y);
+        if colour.w == 0.0 {
+            // Both show what is behind everything.
+            assert_eq!(a, b, "{x}, {y}");
+            continue;
+        }
+        if (x + 3 * y) % 37 != 0 {
+            continue;
+        }
+        let allowed = of_storage(scene, drawn, x, y);
+        let off = (a - b).truncate().abs() / allowed;
+        worst = worst.max(off.max_element());
+        count += 1;
+    }
+    (count, worst)
 }
 
 /// How far a pixel's light may move by the rounding of what the G-buffer holds of it.

@@ -154,8 +154,9 @@ mod tests {
         for (a, row) in products.iter().enumerate() {
             for (b, product) in row.iter().enumerate() {
                 let want = f64::from(u8::from(a == b));
-                // The midpoint rule in z, over polynomials of degree four.
-                assert!((product - want).abs() < 1e-4, "{a}, {b}: {product}");
+                // The midpoint rule is off by h² / 24 times the change of slope: 30
+                // for the steepest square.
+                assert!((product - want).abs() < 1.5e-4, "{a}, {b}: {product}");
             }
         }
     }

@@ -76,9 +76,9 @@ fn maps_and_tables_are_bit_equal_on_every_backend() {
     let map = EnvironmentMap::of_equirectangular(&picture(128, &sky), 64).unwrap();
     let (kernels, all) = (KernelLibrary::new(), Capture::EveryPass);
     let mut executors = executors();
-    let first = run(executors[0].as_mut(), &map, 64, &kernels, all.clone());
+    let first = run(executors[0].as_mut(), &map, 64, &kernels, all);
     for executor in &mut executors[1..] {
-        let other = run(executor.as_mut(), &map, 64, &kernels, all.clone());
+        let other = run(executor.as_mut(), &map, 64, &kernels, all);
         let found = first_difference(&first, &other);
         assert_eq!(found, None, "{}", executor.info());
     }

@@ -69,7 +69,7 @@ fn lambda(cosine: f64, a2: f64) -> f64 {
 }
 
 impl Point {
-    pub(crate) fn to_eye(&self) -> DVec3 {
+    pub(crate) fn to_eye(self) -> DVec3 {
         -self.place.normalize()
     }
 

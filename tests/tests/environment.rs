@@ -3,34 +3,17 @@
 
 mod shading;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
-use etalon::Format;
 use etalon::backend::{Backend, Execution, Inputs};
 use etalon::effects::environment::{EnvironmentMap, Irradiance, Prefilter, environment, mirroring};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
 use etalon::kernel::{Arithmetic, KernelLibrary};
 use etalon::plan::Capture;
-use etalon::resource::TextureDesc;
 use etalon_tests::{cpu, executors, first_difference, plan_for};
 use glam::{DVec2, DVec3};
-use shading::{LEAST_ROUGHNESS, blurred, irradiance, mirrored_parts};
-
-/// An equirectangular picture of what comes from each direction.
-fn picture(width: u32, radiance: &dyn Fn(DVec3) -> DVec3) -> ImageData {
-    let height = width / 2;
-    let texel = |k: u32| {
-        let turn = TAU * ((f64::from(k % width) + 0.5) / f64::from(width) - 0.5);
-        let tilt = PI * (f64::from(k / width) + 0.5) / f64::from(height);
-        let across = tilt.sin();
-        let at = DVec3::new(across * turn.sin(), tilt.cos(), -across * turn.cos());
-        radiance(at).as_vec3().extend(1.0).to_array()
-    };
-    let texels: Vec<_> = (0..width * height).map(texel).collect();
-    let desc = TextureDesc::d2(width, height, Format::Rgba32Float);
-    ImageData::from_rgba_f32(desc, &texels).unwrap()
-}
+use shading::{LEAST_ROUGHNESS, blurred, irradiance, mirrored_parts, picture};
 
 /// A sky brighter to one side, and a soft lamp.
 fn sky(at: DVec3) -> DVec3 {

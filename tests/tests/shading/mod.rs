@@ -5,8 +5,11 @@
 
 use std::f64::consts::{PI, TAU};
 
+use etalon::Format;
 use etalon::effects::geometry::View;
 use etalon::effects::lighting::{LightKind, PunctualLight};
+use etalon::image::ImageData;
+use etalon::resource::TextureDesc;
 use glam::{DMat3, DVec3};
 
 /// Kernels take no surface to be smoother.
@@ -230,4 +233,19 @@ pub(crate) fn blurred(
         }
     }
     sum / weights
+}
+
+/// An equirectangular picture of what comes from each direction.
+pub(crate) fn picture(width: u32, radiance: &dyn Fn(DVec3) -> DVec3) -> ImageData {
+    let height = width / 2;
+    let texel = |k: u32| {
+        let turn = TAU * ((f64::from(k % width) + 0.5) / f64::from(width) - 0.5);
+        let tilt = PI * (f64::from(k / width) + 0.5) / f64::from(height);
+        let across = tilt.sin();
+        let at = DVec3::new(across * turn.sin(), tilt.cos(), -across * turn.cos());
+        radiance(at).as_vec3().extend(1.0).to_array()
+    };
+    let texels: Vec<_> = (0..width * height).map(texel).collect();
+    let desc = TextureDesc::d2(width, height, Format::Rgba32Float);
+    ImageData::from_rgba_f32(desc, &texels).unwrap()
 }

@@ -27,7 +27,7 @@ pub(crate) fn by_normal(scene: &Scene, point: &Point, angle: f64) -> DVec3 {
     turned.into_iter().fold(DVec3::ZERO, DVec3::max)
 }
 
-/// What kernels are off in light from everywhere: the table's two numbers by 0.003
+/// What kernels are off in light from everywhere: the table's two numbers by 0.002
 /// of it at most, and the map by a hundredth, of whose texels the coarsest are 13
 /// degrees wide.
 pub(crate) fn of_table_and_map(scene: &Scene, point: &Point) -> DVec3 {
@@ -36,7 +36,7 @@ pub(crate) fn of_table_and_map(scene: &Scene, point: &Point) -> DVec3 {
     };
     let parts = point.surrounded(&around);
     let bright = around.middle + DVec3::splat(around.slope.abs().x_axis.length());
-    bright * (point.mirrored + 1.0) * 0.003 + parts.mirrored * 0.01 + parts.scattered * 1e-3
+    bright * (point.mirrored + 1.0) * 0.002 + parts.mirrored * 0.01 + parts.scattered * 1e-3
 }
 
 /// The light of a pixel, and how far from it is allowed.

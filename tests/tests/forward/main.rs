@@ -28,8 +28,8 @@ pub(crate) fn by_normal(scene: &Scene, point: &Point, angle: f64) -> DVec3 {
 }
 
 /// What kernels are off in light from everywhere: the table's two numbers by 0.002
-/// of it at most, and the map by a hundredth, of whose texels the coarsest are 13
-/// degrees wide.
+/// of it at most, and the map by a hundredth, half way between the roughnesses of two
+/// mips.
 pub(crate) fn of_table_and_map(scene: &Scene, point: &Point) -> DVec3 {
     let Some(around) = scene.around() else {
         return DVec3::ZERO;

@@ -63,7 +63,7 @@ impl Sky {
         Self {
             above,
             below,
-            map: EnvironmentMap::of_equirectangular(&map, 64).unwrap(),
+            map: EnvironmentMap::of_equirectangular(&map, 256).unwrap(),
             middle: middle + 0.5 * (above + below).as_dvec3(),
             slope: DMat3::from_cols(across, up, along),
         }

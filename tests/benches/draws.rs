@@ -1,10 +1,10 @@
-//! Models drawn by each backend at 1280×720: the prepass with velocity alone, and all
-//! geometry and light.
+//! Models drawn by each backend at 1280×720: the prepass alone, with a G-buffer and its
+//! light map, and lit as they are drawn.
 //!
 //! The registry's gallery, and the flight helmet of glTF's sample models where
 //! `ETALON_INPUTS` names a folder that has it. Figures are of whole executions, the
-//! upload of vertices and the download of one texel's image included, which are the
-//! same for both; compare within one run only.
+//! upload of vertices and the download of the result included, which are the same for
+//! all; compare within one run only.
 
 use std::path::Path;
 
@@ -35,14 +35,24 @@ fn shots() -> Vec<(&'static str, Shot)> {
     models.into_iter().map(shot).collect()
 }
 
-fn plan(executor: &dyn Backend, shot: &Shot, whole: bool) -> Plan {
+#[derive(Clone, Copy)]
+enum Part {
+    Prepass,
+    Deferred,
+    Forward,
+}
+
+fn plan(executor: &dyn Backend, shot: &Shot, part: Part) -> Plan {
     let size = FrameSize::new(1280, 720).expect("a possible size");
     let mut graph = Graph::new();
-    let drawn = shot.draw(&mut graph, size, 1.0 / 60.0).expect("a shot");
-    let result = if whole {
-        drawn.light
-    } else {
-        drawn.prepass.depth
+    let sky = Shot::sky(&mut graph).expect("a sky");
+    let drawn = shot
+        .draw(&mut graph, size, sky, 1.0 / 60.0)
+        .expect("a shot");
+    let result = match part {
+        Part::Prepass => drawn.prepass.depth,
+        Part::Deferred => drawn.deferred,
+        Part::Forward => drawn.light,
     };
     graph.output("result", result).expect("the only output");
     let kernels = KernelLibrary::new();
@@ -51,11 +61,15 @@ fn plan(executor: &dyn Backend, shot: &Shot, whole: bool) -> Plan {
 
 fn draws(criterion: &mut Criterion) {
     for (name, shot) in shots() {
-        for (part, whole) in [("prepass", false), ("light map", true)] {
-            let mut group = criterion.benchmark_group(format!("{name}, {part}, 1280×720"));
+        for (label, part) in [
+            ("prepass", Part::Prepass),
+            ("G-buffer and light map", Part::Deferred),
+            ("forward", Part::Forward),
+        ] {
+            let mut group = criterion.benchmark_group(format!("{name}, {label}, 1280×720"));
             group.sample_size(10);
             for executor in &mut executors() {
-                let plan = plan(executor.as_ref(), &shot, whole);
+                let plan = plan(executor.as_ref(), &shot, part);
                 let id = BenchmarkId::from_parameter(executor.info().backend);
                 group.bench_function(id, |bencher| {
                     bencher.iter(|| executor.execute(&plan, &shot.inputs()).expect("a run"));

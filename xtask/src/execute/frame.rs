@@ -226,7 +226,13 @@ impl Content {
         let mut graph = Graph::new();
         let inputs = match self {
             Self::Frame(frame) => frame.import(&mut graph, DELTA_TIME)?,
-            Self::Shot(shot, size) => shot.draw(&mut graph, *size, DELTA_TIME)?.inputs,
+            Self::Shot(shot, size) => {
+                let sky = Shot::sky(&mut graph)?;
+                let drawn = shot.draw(&mut graph, *size, sky, DELTA_TIME)?;
+                // Or nobody would need it.
+                graph.output("deferred", drawn.deferred)?;
+                drawn.inputs
+            }
         };
         let result = (effect.build)(&mut graph, &inputs)?;
         graph.output("result", result)?;

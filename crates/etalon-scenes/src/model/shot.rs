@@ -3,8 +3,10 @@
 use etalon_core::backend::Inputs;
 use etalon_core::graph::{Graph, GraphError, Texture};
 use etalon_core::image::ImageError;
+use etalon_effects::environment::{Surroundings, mirroring};
+use etalon_effects::forward::{Lamps, Lighting, forward, glass, lamp_bytes};
 use etalon_effects::geometry::{GBuffer, Geometry, Prepass, gbuffer, prepass};
-use etalon_effects::lighting::{LightKind, PunctualLight, Surroundings, lighting};
+use etalon_effects::lighting::{LightKind, PunctualLight, lighting};
 use etalon_effects::{EffectError, SceneInputs};
 use glam::{DVec3, Vec3};
 use thiserror::Error;
@@ -14,11 +16,14 @@ use super::error::ModelError;
 use super::moment::Snapshot;
 use super::parts::Model;
 use crate::camera::{Camera, CameraError, Pose};
-use crate::frame::FrameSize;
+use crate::frame::{FrameError, FrameSize};
 
 /// Lux and candela that count as 1: what a dim room has, so that exposures of
 /// lit models are near 1.
 const UNIT: f32 = 100.0;
+
+/// The name of the list of lights among the graph's imports.
+const LAMPS: &str = "lamps";
 
 /// Why a model cannot be drawn.
 #[derive(Debug, Error)]
@@ -27,6 +32,9 @@ pub enum ShotError {
     /// It cannot be posed.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A picture of no size.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// It cannot be looked at.
     #[error(transparent)]
     Camera(#[from] CameraError),
@@ -48,6 +56,9 @@ pub struct Shot {
     snapshot: Snapshot,
     camera: Camera,
     drawable: Drawable,
+    lights: Vec<PunctualLight>,
+    /// The lights as the camera sees them.
+    lamps: Vec<u8>,
 }
 
 /// The passes that draw a [`Shot`], and what they hand to the effects.
@@ -55,17 +66,20 @@ pub struct Shot {
 pub struct Drawn {
     /// Depth and velocity.
     pub prepass: Prepass,
-    /// What is seen.
+    /// What of it is opaque.
     pub surfaces: GBuffer,
-    /// Its light, `rgba16float`.
+    /// Its light by the G-buffer, `rgba16float`.
+    pub deferred: Texture,
+    /// Its light as it was drawn, with glass over it.
     pub light: Texture,
-    /// All that as effects take it.
+    /// What effects take, with the latter light.
     pub inputs: SceneInputs,
 }
 
 impl Shot {
     /// The model at a time in seconds, seen by its first camera, or from before
-    /// all of it if it has none.
+    /// all of it if it has none; lit by its lights, or by one from above if it has
+    /// none.
     ///
     /// # Errors
     /// As [`Model::at`]; if the model cannot be looked at, as one without size;
@@ -77,19 +91,27 @@ impl Shot {
             None => before(&model, &snapshot)?,
         };
         let drawable = Drawable::new(&model)?;
+        let mut lights = lights(&model, &snapshot, UNIT);
+        if lights.is_empty() {
+            lights.push(PunctualLight {
+                kind: LightKind::Directional,
+                position: DVec3::ZERO,
+                direction: DVec3::new(-0.5, -1.0, -0.8),
+                power: Vec3::splat(3.0),
+                reach: None,
+            });
+        }
+        // Where lights are in view space is the same for every size.
+        let square = FrameSize::new(1, 1)?;
+        let lamps = lamp_bytes(&view(&camera, square)?, &lights).map_err(EffectError::from)?;
         Ok(Self {
             model,
             snapshot,
             camera,
             drawable,
+            lights,
+            lamps,
         })
-    }
-
-    /// The same seen by another camera.
-    #[must_use]
-    pub fn seen_by(mut self, camera: Camera) -> Self {
-        self.camera = camera;
-        self
     }
 
     /// The model.
@@ -113,12 +135,26 @@ impl Shot {
     /// What a graph with the shot's passes is given.
     #[must_use]
     pub fn inputs(&self) -> Inputs<'_> {
-        self.drawable.inputs()
+        self.drawable.inputs().buffer(LAMPS, &self.lamps)
     }
 
-    /// Draws what is opaque: a prepass with velocity, a G-buffer, and a light map
-    /// of the model's lights, or of one from above if it has none, under a grey
-    /// sky. `delta_time` is the seconds since the frame before.
+    /// A grey sky, with its table of what is mirrored.
+    ///
+    /// # Errors
+    /// If the graph refuses the table's pass.
+    pub fn sky(graph: &mut Graph) -> Result<Surroundings, ShotError> {
+        Ok(Surroundings {
+            above: Vec3::new(0.5, 0.6, 0.8),
+            below: Vec3::splat(0.15),
+            background: Vec3::new(0.05, 0.06, 0.08),
+            environment: None,
+            mirroring: Some(mirroring(graph)?),
+        })
+    }
+
+    /// Draws it: a prepass with velocity, a G-buffer with a light map, and once more
+    /// lit as it is drawn, with glass over that. `delta_time` is the seconds since the
+    /// frame before.
     ///
     /// # Errors
     /// If the camera has no projection for the size, or an effect or the graph
@@ -127,22 +163,39 @@ impl Shot {
         &self,
         graph: &mut Graph,
         size: FrameSize,
+        surroundings: Surroundings,
         delta_time: f32,
     ) -> Result<Drawn, ShotError> {
         let view = view(&self.camera, size)?;
         let imported = self.drawable.import(graph)?;
-        let items = imported.opaque_items(&self.model, &self.snapshot);
-        let geometry = Geometry {
-            items: &items,
+        let opaque = imported.opaque_items(&self.model, &self.snapshot);
+        let eye = self.camera.pose().position();
+        let blended = imported.blended_items(&self.model, &self.snapshot, eye);
+        let solid = Geometry {
+            items: &opaque,
             view,
             size: [size.width(), size.height()],
         };
-        let prepass = prepass(graph, &geometry, true)?;
-        let surfaces = gbuffer(graph, &geometry, Some(&prepass))?;
-        let light = lighting(graph, &view, &surfaces, &self.lights(), &surroundings())?;
+        let prepass = prepass(graph, &solid, true)?;
+        let surfaces = gbuffer(graph, &solid, Some(&prepass))?;
+        let deferred = lighting(graph, &view, &surfaces, &self.lights, &surroundings)?;
+        let lit = Lighting {
+            lamps: Lamps::import(graph, LAMPS, self.lights.len() as u32)?,
+            surroundings,
+        };
+        let shaded = forward(graph, &solid, Some(&prepass), &lit, false)?;
+        let mut light = shaded.light;
+        if !blended.is_empty() {
+            let panes = Geometry {
+                items: &blended,
+                ..solid
+            };
+            light = glass(graph, &panes, light, shaded.depth, &lit)?;
+        }
         Ok(Drawn {
             prepass,
             surfaces,
+            deferred,
             light,
             inputs: SceneInputs {
                 colour: light,
@@ -154,30 +207,6 @@ impl Shot {
                 delta_time,
             },
         })
-    }
-
-    /// The model's lights, or one from above.
-    fn lights(&self) -> Vec<PunctualLight> {
-        let mut lights = lights(&self.model, &self.snapshot, UNIT);
-        if lights.is_empty() {
-            lights.push(PunctualLight {
-                kind: LightKind::Directional,
-                position: DVec3::ZERO,
-                direction: DVec3::new(-0.5, -1.0, -0.8),
-                power: Vec3::splat(3.0),
-                reach: None,
-            });
-        }
-        lights
-    }
-}
-
-/// A grey sky.
-const fn surroundings() -> Surroundings {
-    Surroundings {
-        above: Vec3::new(0.5, 0.6, 0.8),
-        below: Vec3::splat(0.15),
-        background: Vec3::new(0.05, 0.06, 0.08),
     }
 }
 

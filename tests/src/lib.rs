@@ -47,17 +47,6 @@ pub fn executors() -> Vec<Box<dyn Backend>> {
     executors
 }
 
-/// Those of the [`executors`] that draw, which the interpreter does not yet.
-///
-/// # Panics
-/// As [`executors`].
-#[must_use]
-pub fn drawing_executors() -> Vec<Box<dyn Backend>> {
-    let mut executors = executors();
-    executors.retain(|executor| executor.info().backend != "cpu");
-    executors
-}
-
 /// The interpreter.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! What is drawn is what exact rays see: depth, normals and velocity of every
 //! model, on every backend.
 
-use etalon::backend::{Backend, BackendError, Execution};
+use etalon::backend::{Backend, Execution};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
@@ -10,8 +10,8 @@ use etalon::plan::Capture;
 use etalon_scenes::model::{AlphaMode, Drawable, Model, Snapshot, view};
 use etalon_scenes::trace::{SurfacePoint, TriangleScene, Truth, TruthOptions};
 use etalon_scenes::{Camera, FrameSize, Pose, models};
-use etalon_tests::{cpu, drawing_executors, plan_for};
-use glam::{DVec2, DVec3, DVec4};
+use etalon_tests::{executors, plan_for};
+use glam::{DMat3, DVec2, DVec3, DVec4};
 
 /// A model at a time, as rays see what of it is opaque.
 struct Scene {
@@ -22,7 +22,7 @@ struct Scene {
     truth: Truth,
 }
 
-fn scenes(size: FrameSize) -> Vec<Scene> {
+fn scenes(size: FrameSize, clearance: f64) -> Vec<Scene> {
     let scene = |entry: &etalon_scenes::ModelEntry| {
         let model = (entry.build)().unwrap();
         let snapshot = model.at(0.5).unwrap();
@@ -33,9 +33,11 @@ fn scenes(size: FrameSize) -> Vec<Scene> {
         };
         let traced =
             TriangleScene::of(&model, &snapshot, |instance| opaque(instance.material)).unwrap();
-        let truth = traced
-            .truth(&camera, size, &TruthOptions::default())
-            .unwrap();
+        let options = TruthOptions {
+            clearance,
+            ..TruthOptions::default()
+        };
+        let truth = traced.truth(&camera, size, &options).unwrap();
         Scene {
             name: entry.name,
             model,
@@ -47,11 +49,7 @@ fn scenes(size: FrameSize) -> Vec<Scene> {
     models().iter().map(scene).collect()
 }
 
-fn draw(
-    executor: &mut dyn Backend,
-    scene: &Scene,
-    size: FrameSize,
-) -> Result<Execution, BackendError> {
+fn draw(executor: &mut dyn Backend, scene: &Scene, size: FrameSize) -> Execution {
     let drawable = Drawable::new(&scene.model).unwrap();
     let mut graph = Graph::new();
     let items = drawable.import(&mut graph).unwrap();
@@ -80,15 +78,50 @@ fn draw(
         Capture::Outputs,
     )
     .unwrap();
-    executor.execute(&plan, &drawable.inputs())
+    executor.execute(&plan, &drawable.inputs()).unwrap()
 }
 
 fn texel(image: &ImageData, x: u32, y: u32) -> [f64; 4] {
     image.texel(x, y, 0, 0).unwrap().to_f64()
 }
 
-/// How much of a pixel corners may move to the grid: half a 256th.
-const SNAP: f64 = 0.5 / 256.0;
+/// How a driver rasterises.
+#[derive(Clone, Copy, Debug)]
+struct Rules {
+    /// Bits of a pixel that corners are moved to (`subPixelPrecisionBits`).
+    sub_pixel_bits: i32,
+    /// Whether planes of triangles that reach behind the near plane are right.
+    /// SwiftShader's depths of such floors are off by several per cent.
+    cuts: bool,
+}
+
+impl Rules {
+    fn of(executor: &dyn Backend) -> Self {
+        let swiftshader = executor.info().device.contains("SwiftShader");
+        Self {
+            sub_pixel_bits: if swiftshader { 4 } else { 8 },
+            cuts: !swiftshader,
+        }
+    }
+
+    /// By how much of a pixel corners may move: half a step of the grid.
+    fn snap(self) -> f64 {
+        0.5_f64.powi(self.sub_pixel_bits + 1)
+    }
+}
+
+/// Whether a triangle reaches behind the near plane.
+fn reaches_behind(scene: &Scene, size: FrameSize, surface: &SurfacePoint) -> bool {
+    let near = scene.camera.projection(size).unwrap().near();
+    let instance = &scene.snapshot.instances.all()[surface.instance as usize];
+    let to_view = scene.camera.pose().view_matrix() * instance.world.as_dmat4();
+    let mesh = &scene.model.parts().meshes[instance.mesh];
+    let corners = mesh.triangles()[surface.triangle as usize];
+    corners.iter().any(|corner| {
+        let position = mesh.vertices().positions[*corner as usize].map(f64::from);
+        -to_view.transform_point3(position.into()).z < near
+    })
+}
 
 /// The change of depth over a pixel in x and in y, which is constant over a plane.
 fn slope(scene: &Scene, size: FrameSize, surface: &SurfacePoint) -> f64 {
@@ -119,7 +152,7 @@ struct Found {
     velocity: f64,
 }
 
-fn compare(scene: &Scene, size: FrameSize, drawn: &Execution) -> Found {
+fn compare(scene: &Scene, size: FrameSize, rules: Rules, drawn: &Execution) -> Found {
     let [depth, normal, velocity, colour] =
         ["depth", "normal", "velocity", "colour"].map(|name| drawn.output(name).unwrap());
     let to_view = scene.camera.pose().view_matrix();
@@ -136,10 +169,13 @@ fn compare(scene: &Scene, size: FrameSize, drawn: &Execution) -> Found {
             continue;
         };
         assert_eq!(at(colour)[3], 1.0, "{}: a surface at {x}, {y}", scene.name);
+        if !rules.cuts && reaches_behind(scene, size, surface) {
+            continue;
+        }
         found.surfaces += 1;
         let exact = surface.depth as f32;
         let unit = f64::from(exact.next_up() - exact);
-        let off = (at(depth)[0] - surface.depth).abs() - SNAP * slope(scene, size, surface);
+        let off = (at(depth)[0] - surface.depth).abs() - rules.snap() * slope(scene, size, surface);
         found.depth = found.depth.max(off / unit);
         let material = scene.snapshot.instances.all()[surface.instance as usize].material;
         if scene.model.parts().materials[material]
@@ -161,20 +197,124 @@ fn compare(scene: &Scene, size: FrameSize, drawn: &Execution) -> Found {
 #[test]
 fn what_is_drawn_is_what_exact_rays_see() {
     let size = FrameSize::new(320, 180).unwrap();
-    for scene in &scenes(size) {
-        for executor in &mut drawing_executors() {
-            let drawn = draw(executor.as_mut(), scene, size).unwrap();
-            let found = compare(scene, size, &drawn);
+    for scene in &scenes(size, 0.5) {
+        for executor in &mut executors() {
+            let rules = Rules::of(executor.as_ref());
+            let drawn = draw(executor.as_mut(), scene, size);
+            let found = compare(scene, size, rules, &drawn);
             let who = format!("{} on {}: {found:?}", scene.name, executor.info());
             println!("{who}");
-            assert!(found.surfaces > 1000, "{who}");
+            assert!(found.surfaces > 1000 || !rules.cuts, "{who}");
             assert!(found.depth <= 4.0, "{who}");
-            assert!(found.normal <= 0.1, "{who}");
+            // Spheres of 20 pixels turn by 3° from one to the next.
+            assert!(found.normal <= 0.1 + 3.0 * rules.snap(), "{who}");
             // Stored as f16: half a unit of the last place of 0.25, and as much
-            // again for what moves by less than that.
-            assert!(found.velocity <= 0.25 / 2048.0, "{who}");
+            // again for what moves by less than that. What was where a corner
+            // is moved to was so much off one frame earlier.
+            let most = 0.25 / 2048.0 + rules.snap() / f64::from(size.height());
+            assert!(found.velocity <= most, "{who}");
         }
     }
+}
+
+/// The pixels in which two pictures differ.
+fn differing(a: &ImageData, b: &ImageData) -> Vec<(u32, u32)> {
+    assert_eq!(a.desc, b.desc);
+    let size = a.desc.format.texel_bytes() as usize;
+    let texels = a.bytes.chunks_exact(size).zip(b.bytes.chunks_exact(size));
+    let width = a.desc.extent.width;
+    let at = |i: usize| (i as u32 % width, i as u32 / width);
+    let different = texels.enumerate().filter(|(_, (a, b))| a != b);
+    different.map(|(i, _)| at(i)).collect()
+}
+
+/// Which pixels show a surface.
+fn covered(drawn: &Execution, (x, y): (u32, u32)) -> bool {
+    texel(drawn.output("colour").unwrap(), x, y)[3] != 0.0
+}
+
+/// Where instances are, in pixels, that are scaled to a line or a point. Rays see
+/// nothing of them, but their corners moved to the grid may have an area.
+fn lines(scene: &Scene, size: FrameSize) -> Vec<[DVec2; 2]> {
+    let pixels = DVec2::new(size.width().into(), size.height().into());
+    let scale = scene.camera.projection(size).unwrap().scale();
+    let all = scene.snapshot.instances.all().iter();
+    let flat = all.filter(|instance| {
+        let matrix = DMat3::from_mat4(instance.world.as_dmat4());
+        let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
+        [x.cross(y), y.cross(z), z.cross(x)]
+            .iter()
+            .all(|normal| *normal == DVec3::ZERO)
+    });
+    let bounds = flat.map(|instance| {
+        let to_view = scene.camera.pose().view_matrix() * instance.world.as_dmat4();
+        let corners = &scene.model.parts().meshes[instance.mesh]
+            .vertices()
+            .positions;
+        let at = corners.iter().map(|corner| {
+            let view = to_view.transform_point3(corner.map(f64::from).into());
+            let place = view.truncate() / -view.z * scale;
+            (place * DVec2::new(0.5, -0.5) + 0.5) * pixels
+        });
+        let start = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        at.fold(start, |[low, high], at| [low.min(at), high.max(at)])
+    });
+    bounds.collect()
+}
+
+/// lavapipe moves corners to the same grid and computes depth by the same
+/// operations: no pixel of any model differs. Others may cover other pixels where
+/// an edge is nearer to the centre than both grids move corners, and those alone.
+#[test]
+fn coverage_and_depth_are_those_of_lavapipe() {
+    for size in [(320, 180), (333, 217)] {
+        let size = FrameSize::new(size.0, size.1).unwrap();
+        let mut executors = executors();
+        let (interpreter, devices) = executors.split_first_mut().unwrap();
+        let rules = devices.iter().map(|device| Rules::of(device.as_ref()));
+        let snap = rules.map(Rules::snap).fold(0.0, f64::max);
+        let ours = Rules::of(interpreter.as_ref()).snap();
+        for scene in &scenes(size, snap + ours) {
+            let lines = lines(scene, size);
+            let expected = draw(interpreter.as_mut(), scene, size);
+            for device in &mut *devices {
+                let drawn = draw(device.as_mut(), scene, size);
+                let who = format!("{} on {}", scene.name, device.info());
+                let pictures = |name| [&expected, &drawn].map(|run| run.output(name).unwrap());
+                let [a, b] = pictures("depth");
+                if device.info().device.contains("llvmpipe") {
+                    assert_eq!(differing(a, b), [], "{who}");
+                    continue;
+                }
+                let pixels =
+                    (0..size.height()).flat_map(|y| (0..size.width()).map(move |x| (x, y)));
+                let other = |at| covered(&expected, at) != covered(&drawn, at);
+                let others: Vec<_> = pixels.filter(|at| other(*at)).collect();
+                println!("{who}: {} pixels are covered otherwise", others.len());
+                let clear = |(x, y): (u32, u32)| {
+                    let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let on_a_line = |[low, high]: &[DVec2; 2]| {
+                        centre.cmpgt(*low - 1.0).all() && centre.cmplt(*high + 1.0).all()
+                    };
+                    scene.truth.at(x, y).unwrap().inner && !lines.iter().any(on_a_line)
+                };
+                let stray: Vec<_> = others.into_iter().filter(|at| clear(*at)).collect();
+                assert_eq!(stray, [], "{who}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_pixel_drawn_otherwise_is_found() {
+    let size = FrameSize::new(32, 18).unwrap();
+    let scene = &scenes(size, 0.5)[0];
+    let drawn = draw(executors()[0].as_mut(), scene, size);
+    let depth = drawn.output("depth").unwrap();
+    let mut other = depth.clone();
+    assert_eq!(differing(depth, &other), []);
+    other.bytes[4 * (32 * 5 + 7)] ^= 1;
+    assert_eq!(differing(depth, &other), [(7, 5)]);
 }
 
 /// The comparison must be able to fail: the camera a centimetre from where rays
@@ -182,7 +322,7 @@ fn what_is_drawn_is_what_exact_rays_see() {
 #[test]
 fn a_scene_seen_from_elsewhere_is_found() {
     let size = FrameSize::new(160, 90).unwrap();
-    let mut scenes = scenes(size);
+    let mut scenes = scenes(size, 0.5);
     let scene = scenes
         .iter_mut()
         .find(|scene| scene.name == "stairs")
@@ -193,26 +333,17 @@ fn a_scene_seen_from_elsewhere_is_found() {
         pose.position() + pose.orientation() * DVec3::new(0.0, 0.0, -1.0),
         DVec3::Y,
     );
-    let mut executors = drawing_executors();
-    let Some(executor) = executors.first_mut() else {
-        return;
-    };
-    let executor = executor.as_mut();
-    let good = compare(scene, size, &draw(executor, scene, size).unwrap());
+    let mut executors = executors();
+    let executor = executors[0].as_mut();
+    let rules = Rules::of(executor);
+    let good = compare(scene, size, rules, &draw(executor, scene, size));
     let seen = scene.camera;
     let fov = seen.vertical_fov();
     scene.camera = Camera::new(moved.unwrap(), fov)
         .unwrap()
         .moved_from(seen.previous_pose());
-    let drawn = draw(executor, scene, size).unwrap();
+    let drawn = draw(executor, scene, size);
     scene.camera = seen;
-    let bad = compare(scene, size, &drawn);
+    let bad = compare(scene, size, rules, &drawn);
     assert!(good.depth <= 4.0 && bad.depth > 40.0, "{good:?}, {bad:?}");
-}
-
-#[test]
-fn the_interpreter_says_that_it_does_not_draw() {
-    let size = FrameSize::new(16, 9).unwrap();
-    let refused = draw(cpu().unwrap().as_mut(), &scenes(size)[0], size);
-    assert!(matches!(refused, Err(BackendError::Unsupported { .. })));
 }

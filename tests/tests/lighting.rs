@@ -1,8 +1,6 @@
-//! The light map is what the reflection model says, computed here in f64 from the
-//! model's usual form: the distribution with its difference of squares, and masking
-//! by tangents.
+//! The light map is what the reflection model says, computed here in f64.
 
-use std::f64::consts::PI;
+mod shading;
 
 use etalon::Format;
 use etalon::backend::Inputs;
@@ -14,8 +12,9 @@ use etalon::image::ImageData;
 use etalon::kernel::{Arithmetic, KernelLibrary};
 use etalon::plan::Capture;
 use etalon::resource::TextureDesc;
-use etalon_tests::{drawing_executors, plan_for};
+use etalon_tests::{executors, plan_for};
 use glam::{DMat4, DQuat, DVec3, DVec4, Vec3};
+use shading::Point;
 
 const WIDTH: u32 = 24;
 const HEIGHT: u32 = 16;
@@ -110,50 +109,15 @@ impl Scene {
         let ndc_x = (f64::from(x) + 0.5) / f64::from(WIDTH) * 2.0 - 1.0;
         let ndc_y = 1.0 - (f64::from(y) + 0.5) / f64::from(HEIGHT) * 2.0;
         let scale = camera.scale.as_dvec2();
-        let point = DVec3::new(ndc_x / scale.x, ndc_y / scale.y, -1.0) * distance;
-        let shines = self
-            .view
-            .view
-            .transform_vector3(light.direction)
-            .normalize();
-        let way = self.view.view.transform_point3(light.position) - point;
-        let power = light.power.as_dvec3();
-        let (towards, irradiance) = match light.kind {
-            LightKind::Directional => (-shines, power),
-            LightKind::Point => (way.normalize(), power / way.length_squared()),
-            LightKind::Spot { inner, outer } => {
-                let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-                let cosine = shines.dot(-way.normalize());
-                let part = ((cosine - outer) / (inner - outer)).clamp(0.0, 1.0);
-                (way.normalize(), power * part * part / way.length_squared())
-            }
-        };
-        let window = light.reach.map_or(1.0, |reach| {
-            (1.0 - (way.length() / f64::from(reach)).powi(4)).clamp(0.0, 1.0)
-        });
         let specular = self.texel("specular", x, y);
-        let normal = self.texel("normal", x, y).truncate().normalize();
-        let roughness = 1.0 - specular.w;
-        let to_eye = -point.normalize();
-        let half = (towards + to_eye).normalize();
-        let [nl, nv, nh] = [towards, to_eye, half].map(|direction| normal.dot(direction));
-        // Interpolated normals that turn away from the eye count as turned to it.
-        let nv = nv.abs().max(1e-4);
-        if nl <= 0.0 {
-            return DVec3::ZERO;
-        }
-        let a2 = roughness.powi(4);
-        let distribution = a2 / (PI * (nh * nh * (a2 - 1.0) + 1.0).powi(2));
-        let lambda = |cosine: f64| {
-            let tangent2 = (1.0 - cosine * cosine) / (cosine * cosine);
-            0.5 * ((1.0 + a2 * tangent2).sqrt() - 1.0)
+        let point = Point {
+            place: DVec3::new(ndc_x / scale.x, ndc_y / scale.y, -1.0) * distance,
+            normal: self.texel("normal", x, y).truncate().normalize(),
+            colour: self.texel("colour", x, y).truncate(),
+            mirrored: specular.truncate(),
+            roughness: 1.0 - specular.w,
         };
-        let masking = 1.0 / (1.0 + lambda(nl) + lambda(nv));
-        let f0 = specular.truncate();
-        let fresnel = f0 + (DVec3::ONE - f0) * (1.0 - towards.dot(half)).powi(5);
-        let scattered = self.texel("colour", x, y).truncate() / PI * (DVec3::ONE - fresnel);
-        let mirrored = fresnel * (distribution * masking / (4.0 * nl * nv));
-        (scattered + mirrored) * nl * irradiance * window
+        point.lit(light, &self.view).sum()
     }
 }
 
@@ -198,7 +162,7 @@ fn each_light_adds_what_the_model_says() {
         .map(|k| &lamps[k..=k])
         .chain([&lamps[..], &lamps[..0]])
         .collect();
-    for executor in &mut drawing_executors() {
+    for executor in &mut executors() {
         for lights in &sets {
             let mut graph = Graph::new();
             let surfaces = scene.import(&mut graph).unwrap();

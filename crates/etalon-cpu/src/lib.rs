@@ -30,6 +30,7 @@ mod lower;
 mod memory;
 mod num;
 mod program;
+mod raster;
 mod registers;
 pub mod semantics;
 
@@ -44,3 +45,7 @@ pub use finding::{Checks, Finding, FindingKind};
 pub use memory::{Buffer, Texture, TextureView};
 pub use num::NumberType;
 pub use program::{BoundResource, DispatchReport, Program, TranslateOptions};
+pub use raster::{
+    DrawCounters, DrawRange, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram,
+    VertexBuffer,
+};

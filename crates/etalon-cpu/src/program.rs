@@ -184,22 +184,7 @@ impl Program {
             });
         };
         let workgroup_size = module.entry_points[index].workgroup_size;
-        let explain = |(fail, span): (Fail, Span)| match fail {
-            Fail::Unsupported(construct) => TranslateError::Unsupported {
-                construct,
-                location: locate(span),
-            },
-            Fail::Invalid(what) => TranslateError::Invalid {
-                what,
-                location: locate(span),
-            },
-            Fail::TooLarge { what, size, limit } => TranslateError::TooLarge {
-                name: name.clone(),
-                what,
-                size,
-                limit,
-            },
-        };
+        let explain = |(fail, span): (Fail, Span)| explain_fail(&name, &*locate, fail, span);
         let overridden = module.entry_points[index]
             .workgroup_size_overrides
             .and_then(|sizes| sizes.into_iter().flatten().next());
@@ -315,7 +300,7 @@ impl Program {
         let immediates = Buffer::from_bytes(&immediates[..need as usize])?;
         let mut bound = Vec::with_capacity(self.bindings.len() + 1);
         for (i, binding) in self.bindings.iter().enumerate() {
-            bound.push(self.check(binding, resources.get(i))?);
+            bound.push(check_binding(&self.name, binding, resources.get(i))?);
         }
         // Where translation has put it.
         bound.push(Resource::Buffer(&immediates));
@@ -394,17 +379,7 @@ impl Program {
             }
             return;
         }
-        for (binding, resource) in self.bindings.iter().zip(resources) {
-            if binding.is_writable() {
-                match resource {
-                    BoundResource::Buffer(buffer) => {
-                        buffer.shadow().into_iter().for_each(written::write);
-                    }
-                    BoundResource::Texture(texture) => texture.note_written(),
-                    BoundResource::Sampler(_) => {}
-                }
-            }
-        }
+        note_written(&self.bindings, resources);
     }
 
     fn explain(&self, failure: exec::DispatchFailure, workgroups: [u32; 3]) -> RunError {
@@ -445,95 +420,136 @@ impl Program {
             },
         }
     }
+}
 
-    fn check<'a>(
-        &self,
-        binding: &BindingInfo,
-        resource: Option<&'a BoundResource<'a>>,
-    ) -> Result<Resource<'a>, RunError> {
-        let mismatch = |expected: String, found: String| RunError::Binding {
-            kernel: self.name.clone(),
-            binding: binding.name.clone(),
-            expected,
-            found,
-        };
-        match (binding.kind, resource) {
-            (
-                BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. },
-                Some(BoundResource::Buffer(buffer)),
-            ) => {
-                if buffer.len() < need.into() {
-                    return Err(mismatch(
-                        format!("a buffer of at least {need} bytes"),
-                        format!("one of {} bytes", buffer.len()),
-                    ));
+/// Notes that all that a program may write is written.
+pub(crate) fn note_written(bindings: &[BindingInfo], resources: &[BoundResource<'_>]) {
+    for (binding, resource) in bindings.iter().zip(resources) {
+        if binding.is_writable() {
+            match resource {
+                BoundResource::Buffer(buffer) => {
+                    buffer.shadow().into_iter().for_each(written::write);
                 }
-                Ok(Resource::Buffer(buffer))
+                BoundResource::Texture(texture) => texture.note_written(),
+                BoundResource::Sampler(_) => {}
             }
-            (BindingKind::Texture { view, kind }, Some(BoundResource::Texture(texture))) => {
-                let desc = texture.desc();
-                let found = match desc.format.sample_kind() {
-                    etalon_core::format::SampleKind::Sint => ChannelKind::Sint,
-                    etalon_core::format::SampleKind::Uint => ChannelKind::Uint,
-                    _ => ChannelKind::Float,
-                };
-                if !fits(view, &desc) || found != kind {
-                    return Err(mismatch(
-                        format!("a {view:?} texture of kind {kind:?}"),
-                        describe(&desc),
-                    ));
+        }
+    }
+}
+
+/// A failed translation with names and places.
+pub(crate) fn explain_fail(
+    name: &str,
+    locate: &dyn Fn(Span) -> Location,
+    fail: Fail,
+    span: Span,
+) -> TranslateError {
+    match fail {
+        Fail::Unsupported(construct) => TranslateError::Unsupported {
+            construct,
+            location: locate(span),
+        },
+        Fail::Invalid(what) => TranslateError::Invalid {
+            what,
+            location: locate(span),
+        },
+        Fail::TooLarge { what, size, limit } => TranslateError::TooLarge {
+            name: name.to_owned(),
+            what,
+            size,
+            limit,
+        },
+    }
+}
+
+/// What a kernel is given for a binding, if it is of the right kind.
+pub(crate) fn check_binding<'a>(
+    kernel: &str,
+    binding: &BindingInfo,
+    resource: Option<&'a BoundResource<'a>>,
+) -> Result<Resource<'a>, RunError> {
+    let mismatch = |expected: String, found: String| RunError::Binding {
+        kernel: kernel.to_owned(),
+        binding: binding.name.clone(),
+        expected,
+        found,
+    };
+    match (binding.kind, resource) {
+        (
+            BindingKind::Uniform { size: need } | BindingKind::Storage { min_size: need, .. },
+            Some(BoundResource::Buffer(buffer)),
+        ) => {
+            if buffer.len() < need.into() {
+                return Err(mismatch(
+                    format!("a buffer of at least {need} bytes"),
+                    format!("one of {} bytes", buffer.len()),
+                ));
+            }
+            Ok(Resource::Buffer(buffer))
+        }
+        (BindingKind::Texture { view, kind }, Some(BoundResource::Texture(texture))) => {
+            let desc = texture.desc();
+            let found = match desc.format.sample_kind() {
+                etalon_core::format::SampleKind::Sint => ChannelKind::Sint,
+                etalon_core::format::SampleKind::Uint => ChannelKind::Uint,
+                _ => ChannelKind::Float,
+            };
+            if !fits(view, &desc) || found != kind {
+                return Err(mismatch(
+                    format!("a {view:?} texture of kind {kind:?}"),
+                    describe(&desc),
+                ));
+            }
+            Ok(Resource::Texture(texture))
+        }
+        (
+            BindingKind::StorageTexture { view, format, .. },
+            Some(BoundResource::Texture(texture)),
+        ) => {
+            let desc = texture.desc();
+            if !fits(view, &desc) || desc.format != format {
+                return Err(mismatch(
+                    format!("a {view:?} texture of format {format}"),
+                    describe(&desc),
+                ));
+            }
+            Ok(Resource::Texture(texture))
+        }
+        (BindingKind::Sampler { comparison }, Some(BoundResource::Sampler(sampler))) => {
+            let kind = |comparison| {
+                if comparison {
+                    "a comparison sampler"
+                } else {
+                    "a filtering sampler"
                 }
-                Ok(Resource::Texture(texture))
+            };
+            if sampler.compare.is_some() != comparison {
+                return Err(mismatch(
+                    kind(comparison).to_owned(),
+                    kind(!comparison).to_owned(),
+                ));
             }
-            (
-                BindingKind::StorageTexture { view, format, .. },
-                Some(BoundResource::Texture(texture)),
-            ) => {
-                let desc = texture.desc();
-                if !fits(view, &desc) || desc.format != format {
-                    return Err(mismatch(
-                        format!("a {view:?} texture of format {format}"),
-                        describe(&desc),
-                    ));
-                }
-                Ok(Resource::Texture(texture))
+            if !sampler.lod.is_valid() {
+                return Err(mismatch(
+                    "a sampler whose least level is not above the greatest".to_owned(),
+                    format!("one of the levels {}", sampler.lod),
+                ));
             }
-            (BindingKind::Sampler { comparison }, Some(BoundResource::Sampler(sampler))) => {
-                let kind = |comparison| {
-                    if comparison {
-                        "a comparison sampler"
-                    } else {
-                        "a filtering sampler"
-                    }
-                };
-                if sampler.compare.is_some() != comparison {
-                    return Err(mismatch(
-                        kind(comparison).to_owned(),
-                        kind(!comparison).to_owned(),
-                    ));
-                }
-                if !sampler.lod.is_valid() {
-                    return Err(mismatch(
-                        "a sampler whose least level is not above the greatest".to_owned(),
-                        format!("one of the levels {}", sampler.lod),
-                    ));
-                }
-                Ok(Resource::Sampler(*sampler))
-            }
-            (kind, found) => {
-                let expected = match kind {
-                    BindingKind::Uniform { .. } | BindingKind::Storage { .. } => "a buffer",
-                    BindingKind::Texture { .. } | BindingKind::StorageTexture { .. } => "a texture",
-                    BindingKind::Sampler { .. } => "a sampler",
-                };
-                let found = match found {
-                    None => "nothing",
-                    Some(BoundResource::Buffer(_)) => "a buffer",
-                    Some(BoundResource::Texture(_)) => "a texture",
-                    Some(BoundResource::Sampler(_)) => "a sampler",
-                };
-                Err(mismatch(expected.to_owned(), found.to_owned()))
-            }
+            Ok(Resource::Sampler(*sampler))
+        }
+        (kind, found) => {
+            let expected = match kind {
+                BindingKind::Uniform { .. } | BindingKind::Storage { .. } => "a buffer",
+                BindingKind::Texture { .. } | BindingKind::StorageTexture { .. } => "a texture",
+                BindingKind::Sampler { .. } => "a sampler",
+            };
+            let found = match found {
+                None => "nothing",
+                Some(BoundResource::Buffer(_)) => "a buffer",
+                Some(BoundResource::Texture(_)) => "a texture",
+                Some(BoundResource::Sampler(_)) => "a sampler",
+            };
+            Err(mismatch(expected.to_owned(), found.to_owned()))
         }
     }
 }

@@ -1,6 +1,7 @@
 //! What can be wrong with an effect's settings and inputs.
 
 use etalon_core::graph::GraphError;
+use etalon_core::image::ImageError;
 use thiserror::Error;
 
 /// A setting outside of its range.
@@ -40,6 +41,9 @@ pub enum EffectError {
         /// Its width and height.
         second_size: [u32; 2],
     },
+    /// An image that cannot be made.
+    #[error(transparent)]
+    Image(#[from] ImageError),
     /// A pass that the graph refuses, such as one given a handle of another graph.
     #[error(transparent)]
     Graph(#[from] GraphError),

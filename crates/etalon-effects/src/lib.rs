@@ -9,6 +9,8 @@
 //! |---|---|---|
 //! | [`geometry`](mod@geometry) | depth, velocity and G-buffer, drawn | `shaders/geometry` |
 //! | [`lighting`](mod@lighting) | lights added up from the G-buffer | `shaders/lighting` |
+//! | [`environment`](mod@environment) | light from everywhere, blurred by roughness | `shaders/environment` |
+//! | [`forward`](mod@forward) | surfaces lit as they are drawn, glass over them | `shaders/forward` |
 //! | [`ssr`](mod@ssr) | screen-space reflection | `shaders/ssr` |
 //! | [`exposure`](mod@exposure) | average luminance and adaptation | `shaders/exposure` |
 //! | [`bloom`](mod@bloom) | glow of bright light | `shaders/bloom` |
@@ -33,8 +35,10 @@ pub mod bloom;
 pub mod chain;
 mod check;
 pub mod composite;
+pub mod environment;
 mod error;
 pub mod exposure;
+pub mod forward;
 pub mod geometry;
 pub mod lighting;
 pub mod registry;

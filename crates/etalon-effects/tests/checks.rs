@@ -5,10 +5,12 @@ mod common;
 use std::collections::BTreeMap;
 
 use common::Run;
+use etalon_core::Format;
 use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::Capture;
 use etalon_cpu::{Checks, CpuBackend, CpuOptions};
 use etalon_effects::effects;
+use etalon_effects::environment::{EnvironmentMap, Prefilter, environment, mirroring};
 use etalon_scenes::{FrameSize, scenes};
 
 #[test]
@@ -47,4 +49,32 @@ fn effects_hide_nothing() {
     }
     let found: Vec<String> = all.into_values().collect();
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// The same of the kernels that make light from everywhere.
+#[test]
+fn surroundings_hide_nothing() {
+    for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {
+        let mut backend = CpuBackend::new(&CpuOptions {
+            checks: Checks::all(),
+            ..CpuOptions::default()
+        })
+        .unwrap();
+        let sky = common::image(Format::Rgba32Float, 64, 32, |x, y| {
+            [x as f32, 8.0, y as f32, 1.0]
+        });
+        let map = EnvironmentMap::of_equirectangular(&sky, 64).unwrap();
+        let mut run = Run::new();
+        run.arithmetic = arithmetic;
+        let base = run.import("base", map.image());
+        let settings = Prefilter::default();
+        let around = environment(&mut run.graph, base, map.irradiance(), &settings).unwrap();
+        run.graph.output("radiance", around.radiance).unwrap();
+        let table = mirroring(&mut run.graph).unwrap();
+        run.graph.output("mirroring", table).unwrap();
+        run.execute(&mut backend, Capture::Outputs);
+        let found = backend.take_findings();
+        let entries: Vec<String> = found.list.iter().map(ToString::to_string).collect();
+        assert!(entries.is_empty() && found.omitted == 0, "{entries:?}");
+    }
 }

@@ -20,7 +20,7 @@ use thiserror::Error;
 use crate::size::Size;
 use crate::test_backends::model::BackendKind;
 use backends::open_for;
-use frame::{Source, SourceError, graph};
+use frame::{Source, SourceError};
 use outcome::{Capture, Label, Outcome, OutcomeError, Run, Time};
 use plant::{Fault, PlantError};
 
@@ -71,10 +71,10 @@ pub struct Job {
     /// The API that wgpu uses.
     #[arg(long, default_value = "vulkan")]
     pub api: Api,
-    /// A scene of the registry.
+    /// A scene or model of the registry.
     #[arg(long, required_unless_present = "input")]
     pub scene: Option<String>,
-    /// A rendered frame instead.
+    /// A rendered frame or a model in a file instead.
     #[arg(long, conflicts_with = "scene")]
     pub input: Option<PathBuf>,
     /// Size of the scene's picture.
@@ -107,16 +107,14 @@ pub struct Job {
 }
 
 impl Job {
-    /// The frame's source.
-    #[must_use]
-    pub fn source(&self) -> Source {
+    /// What to render.
+    ///
+    /// # Errors
+    /// If there is no scene or model of its name.
+    pub fn source(&self) -> Result<Source, SourceError> {
         match (&self.input, &self.scene) {
-            (Some(path), _) => Source::File(path.clone()),
-            (None, name) => Source::Scene {
-                name: name.clone().unwrap_or_default(),
-                width: self.size.width,
-                height: self.size.height,
-            },
+            (Some(path), _) => Ok(Source::of_file(path.clone(), self.size)),
+            (None, name) => Source::named(name.as_deref().unwrap_or_default(), self.size),
         }
     }
 
@@ -252,8 +250,8 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
     // The device first: without one there is no need to render anything.
     let mut opened = open_for(job)?;
     let backend = opened.backend();
-    let frame = job.source().frame()?;
-    let graph = graph(&frame, effect)?;
+    let content = job.source()?.content()?;
+    let graph = content.graph(effect)?;
     let mut kernels = KernelLibrary::new();
     if let Some(fault) = &job.plant {
         fault.in_kernels(&mut kernels)?;
@@ -275,7 +273,7 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
         findings: Vec::new(),
     };
     for number in 0..job.frames {
-        let mut execution = backend.execute(&plan, &frame.inputs())?;
+        let mut execution = backend.execute(&plan, &content.inputs())?;
         if let Some(fault) = &job.plant {
             fault.in_captures(&mut execution)?;
         }

@@ -16,7 +16,6 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use etalon_scenes::scenes;
 use indicatif::{ProgressBar, ProgressStyle};
 use thiserror::Error;
 
@@ -186,7 +185,7 @@ impl Bench<'_> {
             })
             .collect();
         for pair in evaluate::pairs(&finished) {
-            let tolerance = tolerances::of(&case, pair);
+            let tolerance = tolerances::of(&case, source.is_drawn(), pair);
             let compared = evaluate::compare_pair(&case, pair, tolerance, self.gallery.as_mut())?;
             self.report.comparisons.extend(compared);
         }
@@ -307,22 +306,14 @@ fn effects(options: &Options) -> Result<Vec<&'static str>, UnknownEffect> {
 /// The frames to run on; unknown scenes are refused before anything runs.
 fn sources(options: &Options) -> Result<Vec<Source>, SourceError> {
     if let Some(path) = &options.input {
-        return Ok(vec![Source::File(path.clone())]);
+        return Ok(vec![Source::of_file(path.clone(), options.size)]);
     }
-    let names: Vec<String> = if options.scene.is_empty() {
-        scenes().iter().map(|scene| scene.name.to_owned()).collect()
+    let named = |name: &str| Source::named(name, options.size);
+    if options.scene.is_empty() {
+        Source::names().map(named).collect()
     } else {
-        options.scene.clone()
-    };
-    let source = |name: String| match etalon_scenes::scene(&name) {
-        Some(_) => Ok(Source::Scene {
-            name,
-            width: options.size.width,
-            height: options.size.height,
-        }),
-        None => Err(SourceError::NoScene { name }),
-    };
-    names.into_iter().map(source).collect()
+        options.scene.iter().map(|name| named(name)).collect()
+    }
 }
 
 /// What was asked for, as the report has it.
@@ -333,7 +324,7 @@ fn settings(
 ) -> Result<Settings, SourceError> {
     let mut size = (options.size.width, options.size.height);
     if let [file @ Source::File(_)] = sources {
-        let frame = file.frame()?.size();
+        let frame = file.content()?.size();
         size = (frame.width(), frame.height());
     }
     Ok(Settings {

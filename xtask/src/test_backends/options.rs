@@ -42,15 +42,15 @@ impl ArithmeticChoice {
 /// agree, 1 that they did not, 2 that the command line is wrong.
 #[derive(Clone, Debug, Args)]
 pub struct Options {
-    /// A scene to render; may be given several times [default: all]
+    /// A scene or model to render; may be given several times [default: all]
     #[arg(long, value_name = "NAME", conflicts_with = "input")]
     pub scene: Vec<String>,
-    /// Width and height of the scenes' pictures
+    /// Width and height of the scenes' and models' pictures
     #[arg(long, value_name = "WxH", default_value = "640x360")]
     pub size: Size,
-    /// A rendered frame to use instead of scenes, an EXR file with colour,
-    /// depth, normals and so on
-    #[arg(long, value_name = "FRAME.exr")]
+    /// A file to use instead of scenes: a model that the backends draw, or a
+    /// rendered frame with colour, depth, normals and so on
+    #[arg(long, value_name = "MODEL.gltf|MODEL.glb|FRAME.exr")]
     pub input: Option<PathBuf>,
     /// Effects to apply, each by itself; `all` for every one
     #[arg(
@@ -121,8 +121,8 @@ impl Options {
         out: PathBuf,
     ) -> Job {
         let (scene, input) = match source {
-            Source::Scene { name, .. } => (Some(name.clone()), None),
-            Source::File(path) => (None, Some(path.clone())),
+            Source::Scene { name, .. } | Source::Model { name, .. } => (Some(name.clone()), None),
+            Source::File(path) | Source::ModelFile { path, .. } => (None, Some(path.clone())),
         };
         let planted = self.plant.iter().find(|(name, _)| *name == executor.id);
         Job {

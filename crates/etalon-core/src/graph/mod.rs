@@ -52,8 +52,9 @@ pub(crate) use raster::{DeclaredDraw, Extent, RasterWork, Slice};
 pub use raster::{Draw, Load, RasterPass};
 pub use uniform::UniformValue;
 
-use crate::format::SampleKind;
+use crate::format::{Format, SampleKind};
 use crate::resource::{BufferDesc, MAX_LAYERS, MAX_MIPS, TextureDesc};
+use crate::texel::Texel;
 
 /// A texture's or a buffer's description.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -92,6 +93,32 @@ pub enum ClearValue {
 }
 
 impl ClearValue {
+    /// The nearest value that texels of a format hold: drivers round otherwise.
+    pub(crate) fn rounded(self, format: Format) -> Self {
+        let texel = match self {
+            Self::Float(value) => Texel::Float(value),
+            Self::Sint(value) => Texel::Sint(value),
+            Self::Uint(value) => Texel::Uint(value),
+        };
+        let held = format.decode_codes(format.encode_codes(texel));
+        // Channels that are not there stay as they are.
+        let there = 0..format.channels() as usize;
+        let mut rounded = self;
+        match (&mut rounded, held) {
+            (Self::Float(value), Texel::Float(held)) => {
+                value[there.clone()].copy_from_slice(&held[there]);
+            }
+            (Self::Sint(value), Texel::Sint(held)) => {
+                value[there.clone()].copy_from_slice(&held[there]);
+            }
+            (Self::Uint(value), Texel::Uint(held)) => {
+                value[there.clone()].copy_from_slice(&held[there]);
+            }
+            _ => {}
+        }
+        rounded
+    }
+
     /// All channels zero, in the kind that the format takes.
     #[must_use]
     pub const fn zero(kind: SampleKind) -> Self {

@@ -81,6 +81,11 @@ pub(super) fn compile(
     let Assembly { tree, files, names } = guard(variant, "assembling", || {
         assemble::assemble(sources, variant, parsed)
     })?;
+    let texts = files.iter().map(|(_, file)| file.text());
+    let declared: Vec<String> = texts
+        .flat_map(|text| scan::declared(text).bindings)
+        .map(str::to_owned)
+        .collect();
     guard(variant, "compiling", || {
         let printed = assemble::print(&tree);
         let map = SourceMap::new(files, &tree, &printed, &names).map_err(|Misprint(place)| {
@@ -116,11 +121,7 @@ pub(super) fn compile(
                 });
             }
         }
-        let declared = sources.get(&variant.path).map(|text| {
-            let declared = scan::declared(&text);
-            declared.bindings.into_iter().map(str::to_owned).collect()
-        });
-        let mut unused: Vec<String> = declared.unwrap_or_default();
+        let mut unused = declared;
         unused.retain(|name| !bindings.iter().any(|binding| binding.name == *name));
         unused.sort_unstable();
         unused.dedup();

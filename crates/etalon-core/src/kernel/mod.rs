@@ -187,7 +187,7 @@ pub struct Kernel {
     pub bindings: Vec<Binding>,
     /// What it needs that not every device has.
     pub needs: Vec<Need>,
-    /// Names of resources that its file declares but that this variant does
+    /// Names of resources that its files declare but that this variant does
     /// not use, sorted. They need not be bound; that they are given is no
     /// mistake.
     pub unused: Vec<String>,

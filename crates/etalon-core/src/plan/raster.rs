@@ -27,7 +27,8 @@ pub struct PlannedTarget {
     pub resource: u32,
     /// The mip and layer.
     pub range: Subresources,
-    /// What it is filled with before; without it, it keeps what it holds.
+    /// What it is filled with before, as near as its format holds it; without it, it
+    /// keeps what it holds.
     pub clear: Option<ClearValue>,
 }
 
@@ -213,9 +214,10 @@ pub(crate) fn bind_raster(
     let target = |access: &Access, load: Load| PlannedTarget {
         resource: access.resource,
         range: access.range,
-        clear: match load {
-            Load::Keep => None,
-            Load::Clear(value) => Some(value),
+        clear: match (load, &graph.resources[access.resource as usize].desc) {
+            (Load::Keep, _) => None,
+            (Load::Clear(value), ResourceDesc::Texture(desc)) => Some(value.rounded(desc.format)),
+            (Load::Clear(value), ResourceDesc::Buffer(_)) => Some(value),
         },
     };
     let (targets, depth) = pass.accesses.split_at(work.colours.len());

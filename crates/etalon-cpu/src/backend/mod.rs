@@ -3,6 +3,7 @@
 mod findings;
 mod histories;
 mod pool;
+mod raster;
 mod resources;
 mod run;
 mod wide;
@@ -66,6 +67,7 @@ impl Default for CpuOptions {
 #[derive(Debug)]
 pub struct CpuBackend {
     executor: Executor,
+    raster_programs: raster::RasterPrograms,
     programs: HashMap<KernelId, Program>,
     pool: Pool,
     histories: Histories,
@@ -95,6 +97,7 @@ impl CpuBackend {
             .with_tier(options.tier.unwrap_or_else(Tier::best));
         Ok(Self {
             executor,
+            raster_programs: raster::RasterPrograms::default(),
             programs: HashMap::new(),
             pool: Pool::new(options.number_type.is_wide()),
             histories: Histories::default(),

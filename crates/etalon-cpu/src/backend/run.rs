@@ -10,6 +10,7 @@ use etalon_core::plan::{Bound, Groups, Plan, Step};
 use super::histories::clear_texel;
 use super::resources::Resources;
 use super::{CpuBackend, WideCapture, malformed, step_error};
+use crate::binding::BindingInfo;
 use crate::error::RunError;
 use crate::memory::Buffer;
 use crate::program::BoundResource;
@@ -22,8 +23,10 @@ impl CpuBackend {
         wide: Option<&mut Vec<WideCapture>>,
     ) -> Result<Execution, BackendError> {
         for step in &plan.steps {
-            if let Step::Dispatch { kernel, .. } = &step.step {
-                self.prepare(&step.name, &kernel.0)?;
+            match &step.step {
+                Step::Dispatch { kernel, .. } => self.prepare(&step.name, &kernel.0)?,
+                Step::Raster(raster) => self.prepare_raster(plan, &step.name, raster)?,
+                _ => {}
             }
         }
         let mut resources = Resources::default();
@@ -86,12 +89,7 @@ impl CpuBackend {
                 bindings,
                 groups,
             } => self.dispatch(plan, name, &kernel.0, bindings, groups, resources)?,
-            Step::Raster(_) => {
-                return Err(BackendError::Unsupported {
-                    step: name.to_owned(),
-                    what: "draws".to_owned(),
-                });
-            }
+            Step::Raster(raster) => self.raster(plan, name, raster, resources)?,
             Step::ClearTexture {
                 resource,
                 range,
@@ -177,6 +175,83 @@ impl CpuBackend {
         Ok(texels.map_or(WideCapture::None, WideCapture::Texture))
     }
 
+    /// The uniform blocks among what is bound. They are small: each dispatch and
+    /// each draw has copies of its own.
+    pub(super) fn uniforms(
+        &self,
+        plan: &Plan,
+        name: &str,
+        bindings: &[Bound],
+    ) -> Result<Vec<Buffer>, BackendError> {
+        let mut uniforms = Vec::new();
+        for bound in bindings {
+            if let Bound::Uniform(slice) = bound {
+                let range = slice.offset as usize
+                    ..(slice.offset as usize).saturating_add(slice.size as usize);
+                let bytes = plan
+                    .uniforms
+                    .get(range)
+                    .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?;
+                uniforms.push(Buffer::from_bytes(bytes).map_err(|error| step_error(name, error))?);
+            }
+        }
+        Ok(uniforms)
+    }
+
+    /// What the bindings that a program wants are given, in the program's order.
+    pub(super) fn bound<'r>(
+        &'r self,
+        plan: &Plan,
+        name: &str,
+        kernel: &Kernel,
+        (wanted, bindings): (&[BindingInfo], &[Bound]),
+        uniforms: &'r [Buffer],
+        resources: &'r Resources,
+    ) -> Result<Vec<BoundResource<'r>>, BackendError> {
+        let mut next_uniform = uniforms.iter();
+        let mut given = Vec::with_capacity(bindings.len());
+        for bound in bindings {
+            given.push(match *bound {
+                Bound::Texture { resource, range } => BoundResource::Texture(resources.texture(
+                    name,
+                    plan,
+                    &self.histories,
+                    resource,
+                    range,
+                )?),
+                Bound::Buffer { resource } => {
+                    BoundResource::Buffer(resources.buffer(name, resource)?)
+                }
+                Bound::Uniform(_) => BoundResource::Buffer(
+                    next_uniform
+                        .next()
+                        .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?,
+                ),
+                Bound::Sampler(sampler) => BoundResource::Sampler(sampler),
+            });
+        }
+        // The kernel lists bindings by number, the program by declaration.
+        let mut bound = Vec::with_capacity(given.len());
+        for wanted in wanted {
+            let position = kernel.bindings.iter().position(|binding| {
+                (binding.group, binding.binding) == (wanted.group, wanted.binding)
+            });
+            let found = position
+                .and_then(|position| given.get(position))
+                .ok_or_else(|| {
+                    let error = RunError::Binding {
+                        kernel: kernel.name.clone(),
+                        binding: wanted.name.clone(),
+                        expected: "a resource".to_owned(),
+                        found: "nothing".to_owned(),
+                    };
+                    step_error(name, error)
+                })?;
+            bound.push(found.clone());
+        }
+        Ok(bound)
+    }
+
     fn dispatch(
         &mut self,
         plan: &Plan,
@@ -206,65 +281,20 @@ impl CpuBackend {
                 }
             }
         };
-        // Uniform blocks are small: each dispatch has copies of its own.
-        let mut uniforms = Vec::new();
-        for bound in bindings {
-            if let Bound::Uniform(slice) = bound {
-                let range = slice.offset as usize
-                    ..(slice.offset as usize).saturating_add(slice.size as usize);
-                let bytes = plan
-                    .uniforms
-                    .get(range)
-                    .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?;
-                uniforms.push(Buffer::from_bytes(bytes).map_err(|error| step_error(name, error))?);
-            }
-        }
-        let mut next_uniform = uniforms.iter();
-        let mut given = Vec::with_capacity(bindings.len());
-        for bound in bindings {
-            given.push(match *bound {
-                Bound::Texture { resource, range } => BoundResource::Texture(resources.texture(
-                    name,
-                    plan,
-                    &self.histories,
-                    resource,
-                    range,
-                )?),
-                Bound::Buffer { resource } => {
-                    BoundResource::Buffer(resources.buffer(name, resource)?)
-                }
-                Bound::Uniform(_) => BoundResource::Buffer(
-                    next_uniform
-                        .next()
-                        .ok_or_else(|| malformed(name, "its uniforms are not in the plan"))?,
-                ),
-                Bound::Sampler(sampler) => BoundResource::Sampler(sampler),
-            });
-        }
-        // The kernel lists bindings by number, the program by declaration.
-        let mut bound = Vec::with_capacity(given.len());
-        for wanted in program.bindings() {
-            let position = kernel.bindings.iter().position(|binding| {
-                (binding.group, binding.binding) == (wanted.group, wanted.binding)
-            });
-            let found = position
-                .and_then(|position| given.get(position))
-                .ok_or_else(|| {
-                    let error = RunError::Binding {
-                        kernel: kernel.name.clone(),
-                        binding: wanted.name.clone(),
-                        expected: "a resource".to_owned(),
-                        found: "nothing".to_owned(),
-                    };
-                    step_error(name, error)
-                })?;
-            bound.push(found.clone());
-        }
-        self.counters.dispatches += 1;
+        let uniforms = self.uniforms(plan, name, bindings)?;
+        let bound = self.bound(
+            plan,
+            name,
+            kernel,
+            (program.bindings(), bindings),
+            &uniforms,
+            resources,
+        )?;
         let report = program
             .dispatch(&self.executor, groups, &bound)
             .map_err(|error| step_error(name, error))?;
         self.findings.add(name, report.findings);
+        self.counters.dispatches += 1;
         Ok(())
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::check::{Checker, Collector, Shadow};
 use super::link::Linked;
 use super::profile::{Recorder, Recording, Unwatched, Watch};
-use super::state::{Failure, LocalIds, Resource, State};
+use super::state::{Failure, LocalIds, Resource, StageLanes, State};
 use super::subgroup::MAX_SUBGROUP;
 use super::tier::Tier;
 use crate::code::Code;
@@ -151,6 +151,31 @@ impl Executor {
         self.number_type
     }
 
+    /// What [`Executor::with_max_trips`] said.
+    pub(crate) fn max_trips(&self) -> u32 {
+        self.max_trips
+    }
+
+    /// Lanes of the batches of vertex and fragment kernels, which have no more than
+    /// a few chunks: what lies between stages should stay in the nearest cache.
+    pub(crate) fn stage_lanes(&self) -> u32 {
+        self.lanes.unwrap_or(Self::DEFAULT_LANES).min(1024)
+    }
+
+    /// Runs `work` on every worker and waits for all.
+    pub(crate) fn everywhere(&self, threads: usize, work: impl Fn() + Sync) {
+        if threads <= 1 {
+            self.pool.install(&work);
+        } else {
+            self.pool.install(|| {
+                (0..threads)
+                    .into_par_iter()
+                    .with_max_len(1)
+                    .for_each(|_| work());
+            });
+        }
+    }
+
     /// Number of threads.
     #[must_use]
     pub fn threads(&self) -> usize {
@@ -180,7 +205,7 @@ pub(crate) struct Job<'a, N: Number> {
     pub(crate) recording: Option<&'a Mutex<Recording>>,
 }
 
-impl<N: Number> Job<'_, N> {
+impl<'a, N: Number> Job<'a, N> {
     pub(crate) fn run(
         &self,
         executor: &Executor,
@@ -323,12 +348,12 @@ impl<N: Number> Job<'_, N> {
         }
     }
 
-    fn state(
+    pub(super) fn state(
         &self,
         executor: &Executor,
         chunks: usize,
         workgroups: [u32; 3],
-    ) -> Result<State<'_, N>, DispatchFailure> {
+    ) -> Result<State<'a, N>, DispatchFailure> {
         let [vf, vi, uf, ui] = self.code.files.map(|size| size as usize);
         let stride = vf.max(vi);
         let resources = &self.code.resources;
@@ -359,6 +384,11 @@ impl<N: Number> Job<'_, N> {
             subgroup_size: executor.subgroup_size,
             failure: None,
             trips: vec![0; self.code.loops.len()],
+            stage: StageLanes {
+                inputs: allocate(resources.stage.inputs.len().saturating_mul(chunks))?,
+                outputs: allocate(resources.stage.outputs.len().saturating_mul(chunks))?,
+                chunks,
+            },
             checker: Checker::new(self.code, chunks, self.shadows),
         };
         for &(slot, bits) in &self.code.constants {

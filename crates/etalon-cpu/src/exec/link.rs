@@ -5,9 +5,9 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{check, half, image, memory, sample, subgroup, texel_atomic};
+use super::{check, half, image, memory, sample, stage, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
-use crate::ir::Op;
+use crate::ir::{Input, Op};
 use crate::num::Number;
 
 /// The registers of a simple instruction, and where the whole one is found.
@@ -186,6 +186,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
             varying_result,
             inst.mask.is_some(),
         ),
+        Op::Input(Input::Stage(_)) => Handler::new::<stage::StageInputStep>(tier),
         Op::Input(_) if varying_result => Handler::new::<memory::InputStep>(tier),
         Op::Input(_) => Handler::plain::<memory::InputStep>(),
         Op::Table { .. } => memory::table(tier, varying_result),
@@ -203,6 +204,8 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::ImageGather { .. } => sample::gather(tier, varying_result),
         Op::ImageAtomic { .. } => Handler::plain::<texel_atomic::ImageAtomic>(),
         Op::ImageQuery { .. } => image::query(tier, varying_result),
+        Op::Derivative { .. } => stage::derivative(tier, varying_result),
+        Op::StageOutput { .. } => Handler::new::<stage::Output>(tier),
         Op::Subgroup { .. } => Handler::plain::<subgroup::Subgroup>(),
         Op::Barrier => Handler::plain::<Barrier>(),
         Op::Check(_) => Handler::plain::<check::CheckStep>(),

@@ -46,6 +46,8 @@ impl<N: Number> Step<N> for InputStep {
             Input::WorkgroupId(a) => return state.set_ints(to, 0, &[state.workgroup[axis(a)]]),
             Input::NumWorkgroups(a) => return state.set_ints(to, 0, &[state.workgroups[axis(a)]]),
             Input::SubgroupSize => return state.set_ints(to, 0, &[state.subgroup_size]),
+            // A handler of their own.
+            Input::Stage(_) => return,
         };
         let [first, step] = base;
         for chunk in 0..state.chunks {

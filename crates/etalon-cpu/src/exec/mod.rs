@@ -11,6 +11,7 @@
 mod arith;
 mod check;
 mod dispatch;
+mod fused;
 mod half;
 mod image;
 #[allow(unsafe_code)]
@@ -21,6 +22,7 @@ mod link;
 mod memory;
 mod profile;
 mod sample;
+mod stage;
 mod state;
 mod subgroup;
 mod texel_atomic;
@@ -36,7 +38,12 @@ pub use tier::Tier;
 
 pub(crate) use check::{Detail, Found, Part, Shadow, Site};
 pub(crate) use dispatch::{DispatchFailure, Job};
+pub(crate) use fused::Fused;
+pub(crate) use isa::Isa;
 pub(crate) use lanes::Operands;
 pub(crate) use link::Linked;
 pub(crate) use profile::Recording;
+pub(crate) use stage::{Stage, StageFailure};
 pub(crate) use state::{Failure, LocalIds, Resource};
+pub(crate) use texels::{OUTSIDE, fetch, put};
+pub(crate) use tier::{Work, work};

@@ -67,6 +67,16 @@ pub(crate) enum Failure {
     DivergentBarrier { inst: u32, invocation: u32 },
 }
 
+/// What the invocations of a batch are given and give: for each slot as many
+/// entries as a batch has chunks at most, as bits.
+#[derive(Debug, Default)]
+pub(crate) struct StageLanes {
+    pub(crate) inputs: Vec<Lanes<u32>>,
+    pub(crate) outputs: Vec<Lanes<u32>>,
+    /// Entries of each slot.
+    pub(crate) chunks: usize,
+}
+
 /// A worker's state.
 pub(crate) struct State<'a, N: Number> {
     pub(crate) registers: Registers<N>,
@@ -91,6 +101,8 @@ pub(crate) struct State<'a, N: Number> {
     pub(crate) failure: Option<Failure>,
     /// Trips of each loop since it was entered.
     pub(crate) trips: Vec<u32>,
+    /// Of vertex and fragment kernels.
+    pub(crate) stage: StageLanes,
     /// Of programs with checks.
     pub(crate) checker: Option<Box<Checker<'a>>>,
 }

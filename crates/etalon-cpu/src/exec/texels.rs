@@ -13,7 +13,7 @@ use crate::num::f16_to_f32;
 use crate::registers::LANES;
 
 /// Stands for a texel outside: no texture has so many.
-pub(super) const OUTSIDE: u32 = u32::MAX;
+pub(crate) const OUTSIDE: u32 = u32::MAX;
 
 /// A texel's bytes in memory, or half of them.
 pub(super) trait Word: Sync {
@@ -265,7 +265,7 @@ macro_rules! halves {
 /// Reads the channels that `wanted` asks for; in the others is anything. All are
 /// zero outside.
 #[inline(always)]
-pub(super) fn fetch<I: Isa, const K: usize>(
+pub(crate) fn fetch<I: Isa, const K: usize>(
     texture: &TextureView<'_>,
     index: &[u32; K],
     wanted: [bool; 4],
@@ -367,7 +367,7 @@ fn words<const K: usize>(texels: &Texels, index: &[u32; K]) -> [[u64; K]; 2] {
 
 /// Writes texels where the index is inside.
 #[inline(always)]
-pub(super) fn put<I: Isa>(
+pub(crate) fn put<I: Isa>(
     texture: &TextureView<'_>,
     index: &[u32; LANES],
     channels: &Channels<LANES>,

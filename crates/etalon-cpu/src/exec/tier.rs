@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use super::fused::{self, Fused};
 use super::isa::{self, Isa};
 use super::link::Instr;
 use super::state::State;
@@ -153,6 +154,40 @@ impl<N: Number, S: TieredStep<N>, I: Isa> Step<N> for Told<S, I> {
     fn run(state: &mut State<'_, N>, instr: &Instr) {
         S::run::<I>(state, instr);
     }
+}
+
+/// Work beside the bytecode that uses what instruction sets have.
+pub(crate) trait Work {
+    fn run<I: Isa, F: Fused>(&mut self);
+}
+
+/// Does work in the instructions of a tier, or of the baseline where the processor
+/// has not all that is needed.
+pub(crate) fn work<W: Work>(tier: Tier, work: &mut W) {
+    #[cfg(target_arch = "x86_64")]
+    if std::is_x86_feature_detected!("fma") {
+        match tier.or_baseline() {
+            // SAFETY: the processor was seen to have the instructions.
+            Tier::Avx512 => return unsafe { avx512_work(work) },
+            // SAFETY: likewise.
+            Tier::Avx2 => return unsafe { avx2_work(work) },
+            Tier::Baseline => {}
+        }
+    }
+    let _ = tier;
+    work.run::<isa::Baseline, fused::Software>();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,f16c,fma")]
+fn avx2_work<W: Work>(work: &mut W) {
+    work.run::<isa::Avx2, fused::Hardware>();
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,f16c,fma,avx512f,avx512bw,avx512dq,avx512vl")]
+fn avx512_work<W: Work>(work: &mut W) {
+    work.run::<isa::Avx512, fused::Hardware>();
 }
 
 /// A clock that is cheap to read. Readings are not ordered against the

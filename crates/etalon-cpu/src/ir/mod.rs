@@ -8,11 +8,13 @@
 pub(crate) mod arith;
 mod check;
 mod op;
+mod stage;
 pub(crate) mod subgroup;
 
 pub(crate) use arith::{Arith, Class};
 pub(crate) use check::{Access, Check, Indexed};
 pub(crate) use op::{AtomicFunction, ImageAccess, ImageQuery, Input, Memory, Op, Sampling};
+pub(crate) use stage::{Interpolation, StageInput, StageOutput, StageSlots};
 
 use naga::Span;
 
@@ -143,6 +145,8 @@ pub(crate) struct Resources {
     pub(crate) workgroup: Slots,
     /// What the program watches for.
     pub(crate) checks: Checks,
+    /// Of vertex and fragment kernels.
+    pub(crate) stage: StageSlots,
 }
 
 /// A number of memory slots of each class.

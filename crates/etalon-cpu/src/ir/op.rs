@@ -29,6 +29,8 @@ pub(crate) enum Input {
     SubgroupSize,
     /// All ones in lanes that hold an invocation.
     ActiveLanes,
+    /// What a vertex or fragment kernel is given, by its slot.
+    Stage(u16),
 }
 
 /// Memory addressed by slots of one class, not by bytes.
@@ -80,6 +82,8 @@ pub(crate) struct Sampling {
     pub(crate) compare: bool,
     /// Whether derivatives are given in place of the level.
     pub(crate) gradient: bool,
+    /// Whether something to add to the level follows the derivatives.
+    pub(crate) bias: bool,
     /// Whether coordinates are kept half a texel from the edges of level 0.
     pub(crate) clamp: bool,
 }
@@ -192,6 +196,17 @@ pub(crate) enum Op {
         image: u16,
         query: ImageQuery,
     },
+    /// The difference of a number between neighbours in a quad of fragments.
+    Derivative {
+        /// Down and not to the right.
+        down: bool,
+        /// Of the upper left neighbours for the whole quad.
+        coarse: bool,
+    },
+    /// What a vertex or fragment kernel gives, by its slot.
+    StageOutput {
+        slot: u16,
+    },
     /// Among the active invocations of each subgroup.
     Subgroup {
         function: SubgroupFunction,
@@ -216,7 +231,8 @@ impl Op {
             | Self::BufferLength { .. }
             | Self::ImageSample { .. }
             | Self::ImageGather { .. }
-            | Self::ImageQuery { .. } => true,
+            | Self::ImageQuery { .. }
+            | Self::Derivative { .. } => true,
             _ => false,
         }
     }
@@ -254,6 +270,7 @@ impl Op {
                     | Input::ActiveLanes
                     | Input::BatchedWorkgroupX
                     | Input::GlobalId { .. }
+                    | Input::Stage(_)
             ),
             Self::MemoryLoad { memory, .. } => memory == Memory::Private,
             Self::BufferAtomic { .. } | Self::WorkgroupAtomic { .. } | Self::Subgroup { .. } => {
@@ -287,6 +304,7 @@ impl Op {
             Self::Input(_)
             | Self::Table { .. }
             | Self::BufferLength { .. }
+            | Self::Derivative { .. }
             | Self::ImageQuery { .. } => Some(1),
             Self::BufferLoad { .. } => Some(3),
             Self::MemoryLoad { .. } => Some(3),
@@ -317,6 +335,7 @@ impl fmt::Display for Op {
                 Input::NumWorkgroups(a) => write!(f, "num_workgroups.{}", axis(a)),
                 Input::SubgroupSize => f.write_str("subgroup_size"),
                 Input::ActiveLanes => f.write_str("active_lanes"),
+                Input::Stage(slot) => write!(f, "stage.{slot}"),
             },
             Self::Move(c) => write!(f, "move.{}", class(c)),
             Self::Table { table, class: c } => write!(f, "table.{} t{table}", class(c)),
@@ -364,6 +383,7 @@ impl fmt::Display for Op {
                 for (is, word) in [
                     (sampling.compare, " compare"),
                     (sampling.gradient, " gradient"),
+                    (sampling.bias, " bias"),
                     (sampling.clamp, " clamp"),
                 ] {
                     f.write_str(if is { word } else { "" })?;
@@ -383,6 +403,11 @@ impl fmt::Display for Op {
                 write!(f, "image.atomic.{function:?} b{}", access.image)
             }
             Self::ImageQuery { image, query } => write!(f, "image.query b{image} {query:?}"),
+            Self::Derivative { down, coarse } => {
+                let axis = if down { 'y' } else { 'x' };
+                write!(f, "d{axis}{}", if coarse { ".coarse" } else { "" })
+            }
+            Self::StageOutput { slot } => write!(f, "give.{slot}"),
             Self::Subgroup { function, class: c } => {
                 write!(f, "subgroup.{} {function:?}", class(c))
             }

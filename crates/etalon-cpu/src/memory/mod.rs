@@ -4,6 +4,7 @@
 //! stores for the processor, and well defined when invocations race.
 
 mod buffer;
+mod srgb;
 mod texel;
 mod texture;
 mod wide;

@@ -6,6 +6,7 @@
 use etalon_core::Format;
 use etalon_core::texel::Texel;
 
+use super::srgb;
 use crate::num::{f16_to_f32, f32_to_f16};
 
 /// The words of `K` texels, low and high; formats of up to 8 bytes use the low one.
@@ -135,6 +136,13 @@ pub(crate) fn decode<const K: usize>(
             each!(wanted[2], out[2], k, unorm8(low[k] as u32 >> 16));
             each!(wanted[3], out[3], k, unorm8(low[k] as u32 >> 24));
         }
+        Format::Rgba8UnormSrgb => {
+            let tables = srgb::tables();
+            each!(wanted[0], out[0], k, tables.linear(low[k] as u32));
+            each!(wanted[1], out[1], k, tables.linear(low[k] as u32 >> 8));
+            each!(wanted[2], out[2], k, tables.linear(low[k] as u32 >> 16));
+            each!(wanted[3], out[3], k, unorm8(low[k] as u32 >> 24));
+        }
         _ => {
             for k in 0..K {
                 let mut bytes = [0; 16];
@@ -210,6 +218,19 @@ pub(crate) fn encode<const K: usize>(format: Format, channels: &Channels<K>, out
             let mut codes = [0; K];
             unorm8_codes(channels, &mut codes);
             words!(out[0], k, u64::from(codes[k]));
+        }
+        Format::Rgba8UnormSrgb => {
+            let tables = srgb::tables();
+            words!(
+                out[0],
+                k,
+                u64::from(
+                    tables.code(r[k])
+                        | tables.code(g[k]) << 8
+                        | tables.code(b[k]) << 16
+                        | code8(a[k]) << 24
+                )
+            );
         }
         _ => {
             for k in 0..K {

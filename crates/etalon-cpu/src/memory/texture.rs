@@ -389,6 +389,11 @@ impl TextureView<'_> {
 
     /// A texel by its index.
     fn texel(&self, index: usize) -> Option<Texel> {
+        Some(self.desc.format.decode(&self.texel_bytes(index)?))
+    }
+
+    /// The bytes of a texel by its index.
+    pub(crate) fn texel_bytes(&self, index: usize) -> Option<[u8; 16]> {
         let mut bytes = [0; 16];
         match self.texels {
             Texels::B1(words) => bytes[0] = words.get(index)?.load(Ordering::Relaxed),
@@ -409,7 +414,27 @@ impl TextureView<'_> {
                 }
             }
         }
-        Some(self.desc.format.decode(&bytes))
+        Some(bytes)
+    }
+
+    /// Writes the bytes of a texel by its index, if there is one.
+    pub(crate) fn set_texel_bytes(&self, index: usize, bytes: &[u8; 16]) {
+        each!(self.texels, words => {
+            let per = if matches!(self.texels, Texels::B16(_)) { 2 } else { 1 };
+            let words = words.iter().skip(index.saturating_mul(per)).take(per);
+            for (word, chunk) in words.zip(chunks(bytes)) {
+                word.store(from_bytes(*chunk), Ordering::Relaxed);
+            }
+        });
+    }
+
+    /// Sets a texel of the wide plane, if there is one, to the texel's value.
+    pub(crate) fn widen_texel(&self, index: usize) {
+        if let Some(wide) = self.wide
+            && let Some(value) = self.texel(index).and_then(widened)
+        {
+            wide.set(index, value);
+        }
     }
 
     /// A texel by its index in `f64`: from the wide plane, or widened.

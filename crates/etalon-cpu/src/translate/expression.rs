@@ -271,7 +271,9 @@ impl<'a> Translator<'a> {
                 return Err(Fail::invalid("a result is used before its statement"));
             }
             Expression::Override(_) => return Err(Fail::invalid("an override was not resolved")),
-            Expression::Derivative { .. } => return Err(Fail::unsupported("derivatives")),
+            Expression::Derivative { axis, ctrl, expr } => {
+                self.derivative(frame, axis, ctrl, expr)?
+            }
             Expression::RayQueryVertexPositions { .. }
             | Expression::RayQueryProceedResult
             | Expression::RayQueryGetIntersection { .. } => {

@@ -141,8 +141,10 @@ impl<'a> Translator<'a> {
         let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
         self.check_texel(access, false, signed, Access::Write, &operands);
         operands.extend(self.scalars(frame, value)?);
-        self.builder
-            .op(Op::ImageStore { access, class }, &operands, &[]);
+        self.where_alive(|this| {
+            this.builder
+                .op(Op::ImageStore { access, class }, &operands, &[]);
+        });
         Ok(())
     }
 
@@ -175,8 +177,10 @@ impl<'a> Translator<'a> {
             &operands,
         );
         operands.push(self.scalar(frame, value)?);
-        self.builder
-            .op(Op::ImageAtomic { access, function }, &operands, &[]);
+        self.where_alive(|this| {
+            this.builder
+                .op(Op::ImageAtomic { access, function }, &operands, &[]);
+        });
         Ok(())
     }
 
@@ -229,7 +233,7 @@ impl<'a> Translator<'a> {
                 &[class; 4],
             ));
         }
-        let mut gradient = false;
+        let (mut gradient, mut bias) = (false, None);
         match level {
             SampleLevel::Zero => operands.push(self.builder.float(0.0)),
             // Depth textures take an integer.
@@ -251,6 +255,21 @@ impl<'a> Translator<'a> {
                     }
                     operands.extend(values);
                 }
+            }
+            SampleLevel::Auto | SampleLevel::Bias(_) if self.stage.is_fragment() => {
+                gradient = true;
+                if let SampleLevel::Bias(expression) = level {
+                    bias = Some(self.scalar(frame, expression)?);
+                }
+                // One level for a quad, of its upper left differences: one of the
+                // ways that Vulkan 1.3 (§16.5.3) leaves open, and lavapipe's.
+                let coordinates = &place[..usize::from(access.coordinates)];
+                for down in [false, true] {
+                    for &coordinate in coordinates {
+                        operands.push(self.difference(coordinate, down, true));
+                    }
+                }
+                operands.extend(bias);
             }
             SampleLevel::Auto | SampleLevel::Bias(_) => {
                 return Err(Fail::unsupported(
@@ -274,6 +293,7 @@ impl<'a> Translator<'a> {
                     offset,
                     compare: depth_ref.is_some(),
                     gradient,
+                    bias: bias.is_some(),
                     clamp: clamp_to_edge,
                 },
             },

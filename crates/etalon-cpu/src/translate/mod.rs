@@ -10,6 +10,7 @@ mod layout;
 mod math;
 mod place;
 mod scan;
+mod stage;
 mod statement;
 mod subgroup;
 
@@ -24,6 +25,8 @@ use naga::{
 use self::builder::Builder;
 use self::layout::class_of;
 use self::place::Place;
+pub(crate) use self::stage::StageKind;
+use self::stage::StageState;
 use crate::binding::{BindingInfo, describe_binding};
 use crate::ir::{Input, Op, ScopeId, Tree, Value, Variable};
 use crate::program::TranslateOptions;
@@ -95,6 +98,7 @@ pub(crate) struct Translator<'a> {
     /// Variables of `var<private>`s, which any call may change.
     private_variables: Vec<Variable>,
     workgroup_size: [u32; 3],
+    stage: StageState<'a>,
 }
 
 /// Translates the entry point of the given index.
@@ -104,6 +108,19 @@ pub(crate) fn translate(
     module: &Module,
     info: &ModuleInfo,
     entry_point: usize,
+    options: &TranslateOptions,
+) -> Result<Translation, (Fail, Span)> {
+    translate_stage(module, info, entry_point, &[], StageKind::Compute, options)
+}
+
+/// [`translate`] for any stage; bindings are those of the entry points `others` as
+/// well.
+pub(crate) fn translate_stage<'a>(
+    module: &'a Module,
+    info: &'a ModuleInfo,
+    entry_point: usize,
+    others: &[usize],
+    kind: StageKind<'a>,
     options: &TranslateOptions,
 ) -> Result<Translation, (Fail, Span)> {
     let mut translator = Translator {
@@ -117,12 +134,16 @@ pub(crate) fn translate(
         indexed: scan::indexed(module),
         private_variables: Vec::new(),
         workgroup_size: module.entry_points[entry_point].workgroup_size,
+        stage: StageState {
+            kind,
+            ..StageState::default()
+        },
     };
     // Checks know one workgroup at a time.
     translator.builder.tree.independent =
         !options.checks.any() && !scan::is_collective(module, info, entry_point);
     translator.builder.tree.resources.checks = options.checks;
-    match translator.entry_point(entry_point) {
+    match translator.entry_point(entry_point, others) {
         Ok(()) => Ok(Translation {
             bindings: translator.bindings,
             immediates: translator.immediates,
@@ -133,10 +154,15 @@ pub(crate) fn translate(
 }
 
 impl<'a> Translator<'a> {
-    fn entry_point(&mut self, index: usize) -> Result<(), Fail> {
+    fn entry_point(&mut self, index: usize, others: &[usize]) -> Result<(), Fail> {
         let entry = &self.module.entry_points[index];
         let info = self.info.get_entry_point(index);
-        self.declare_globals(info)?;
+        let others: Vec<&FunctionInfo> = others
+            .iter()
+            .map(|&other| self.info.get_entry_point(other))
+            .collect();
+        self.declare_globals(info, &others)?;
+        self.begin_stage();
         let mut arguments = Vec::new();
         for argument in &entry.function.arguments {
             arguments.push(Operand::Scalars(
@@ -153,7 +179,7 @@ impl<'a> Translator<'a> {
         )?;
         let body = self.builder.end(falls_through);
         self.builder.finish_scope(scope, body);
-        Ok(())
+        self.end_stage(&frame)
     }
 
     fn frame(
@@ -198,11 +224,17 @@ impl<'a> Translator<'a> {
         Ok(frame)
     }
 
-    fn declare_globals(&mut self, info: &FunctionInfo) -> Result<(), Fail> {
+    fn declare_globals(
+        &mut self,
+        info: &FunctionInfo,
+        others: &[&FunctionInfo],
+    ) -> Result<(), Fail> {
         let mut names = HashSet::new();
         let mut immediates = None;
         for (handle, global) in self.module.global_variables.iter() {
-            if info[handle].is_empty() {
+            let elsewhere = others.iter().any(|other| !other[handle].is_empty());
+            let shared = global.binding.is_some() || global.space == AddressSpace::Immediate;
+            if info[handle].is_empty() && !(elsewhere && shared) {
                 continue;
             }
             self.builder.span = self.module.global_variables.get_span(handle);
@@ -272,7 +304,19 @@ impl<'a> Translator<'a> {
         binding: Option<&naga::Binding>,
     ) -> Result<Vec<Value>, Fail> {
         match (binding, self.inner(ty)) {
-            (Some(naga::Binding::BuiltIn(builtin)), _) => self.builtin(*builtin),
+            (Some(naga::Binding::BuiltIn(builtin)), _) => match self.stage_builtin(*builtin) {
+                Some(values) => Ok(values),
+                None => self.builtin(*builtin),
+            },
+            (
+                Some(&naga::Binding::Location {
+                    location,
+                    interpolation,
+                    sampling,
+                    ..
+                }),
+                ty,
+            ) => self.stage_location(ty, location, interpolation, sampling),
             (None, TypeInner::Struct { members, .. }) => {
                 let mut values = Vec::new();
                 for member in members {
@@ -280,9 +324,7 @@ impl<'a> Translator<'a> {
                 }
                 Ok(values)
             }
-            _ => Err(Fail::unsupported(
-                "inputs of compute shaders other than built-in ones",
-            )),
+            _ => Err(Fail::invalid("an input has no binding")),
         }
     }
 

@@ -416,14 +416,16 @@ impl<'a> Translator<'a> {
                     let half = self.builder.arith(Arith::FToHalf, &[value]);
                     let operands: Vec<Value> =
                         [half, at.shift].into_iter().chain(at.index).collect();
-                    self.builder.op(
-                        Op::BufferStoreHalf {
-                            buffer,
-                            offset: at.word,
-                        },
-                        &operands,
-                        &[],
-                    );
+                    self.where_alive(|this| {
+                        this.builder.op(
+                            Op::BufferStoreHalf {
+                                buffer,
+                                offset: at.word,
+                            },
+                            &operands,
+                            &[],
+                        );
+                    });
                 }
                 &Root::Buffer {
                     buffer,
@@ -433,15 +435,17 @@ impl<'a> Translator<'a> {
                 } => {
                     let offset = offset.saturating_add(leaf.offset) / 4;
                     let operands: Vec<Value> = [value].into_iter().chain(computed).collect();
-                    self.builder.op(
-                        Op::BufferStore {
-                            buffer,
-                            offset,
-                            class,
-                        },
-                        &operands,
-                        &[],
-                    );
+                    self.where_alive(|this| {
+                        this.builder.op(
+                            Op::BufferStore {
+                                buffer,
+                                offset,
+                                class,
+                            },
+                            &operands,
+                            &[],
+                        );
+                    });
                 }
             }
         }
@@ -492,7 +496,7 @@ impl<'a> Translator<'a> {
             }
         };
         let operands: Vec<Value> = values.iter().copied().chain(index).collect();
-        Ok(self.builder.op(op, &operands, &[Class::Int])[0])
+        Ok(self.atomic_where_alive(op, &operands))
     }
 }
 

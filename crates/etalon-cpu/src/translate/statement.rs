@@ -217,7 +217,7 @@ impl<'a> Translator<'a> {
                 arguments,
                 result,
             } => self.call(frame, *function, arguments, *result)?,
-            Statement::Kill => return Err(Fail::unsupported("`discard`")),
+            Statement::Kill => self.discard()?,
             Statement::ImageAtomic {
                 image,
                 coordinate,
@@ -420,6 +420,7 @@ impl<'a> Translator<'a> {
         if calls {
             variables.extend(&self.private_variables);
         }
+        variables.extend(self.stage.alive);
         variables
     }
 

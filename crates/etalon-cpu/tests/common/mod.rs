@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub(crate) mod checks;
+pub(crate) mod raster;
 
 use etalon_core::Format;
 use etalon_core::image::ImageData;

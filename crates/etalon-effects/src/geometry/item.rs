@@ -129,15 +129,16 @@ impl Surface {
         self.base.w < self.cutoff
     }
 
-    /// Sets what `geometry/gbuffer` asks for.
-    pub(super) fn set(&self, draw: Draw) -> Draw {
+    /// Sets what `lib/surface` asks for.
+    pub(crate) fn set(&self, draw: Draw) -> Draw {
         let mut draw = draw
             .set("base", self.base)
             .set("cutoff", self.cutoff)
             .set("metalness", self.metalness)
             .set("roughness", self.roughness)
             .set("mirrored", self.mirrored)
-            .set("emission", self.emission);
+            .set("emission", self.emission)
+            .set("bend", self.bend);
         let maps = &self.maps;
         for (feature, map) in [
             ("base_map", maps.base),
@@ -148,9 +149,6 @@ impl Surface {
             if let Some(map) = map {
                 draw = draw.feature(feature, true).read(feature, map);
             }
-        }
-        if maps.normal.is_some() {
-            draw = draw.set("bend", self.bend);
         }
         if maps.any() {
             draw = draw.feature("mapped", true).sampler("linear", self.sampler);

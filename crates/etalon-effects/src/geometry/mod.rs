@@ -164,24 +164,8 @@ pub fn gbuffer(
     prepass: Option<&Prepass>,
 ) -> Result<GBuffer, EffectError> {
     geometry.validate()?;
-    let mut state = geometry.view.nearer();
-    let (depth, load) = match prepass {
-        Some(prepass) => {
-            state.compare = Compare::Equal;
-            state.write = false;
-            (prepass.depth, Load::Keep)
-        }
-        None => {
-            let depth = geometry.target(graph, "depth", Format::Depth32Float);
-            let far = geometry.view.far_depth();
-            (depth, Load::Clear(ClearValue::Float([far; 4])))
-        }
-    };
-    let draws = geometry.draws(|item| {
-        let draw = geometry.placed(item, "geometry/gbuffer", Some(state));
-        let normal = geometry.view.normal_matrix(item.world);
-        item.surface.set(draw.set("normal_view", normal.as_mat4()))
-    });
+    let (state, depth, load) = geometry.against(graph, prepass);
+    let draws = geometry.draws(|item| geometry.surfaced(item, "geometry/gbuffer", state));
     let colours = [
         ("colour", Format::Rgba16Float),
         ("normal", Format::Rgba16Float),
@@ -208,7 +192,7 @@ pub fn gbuffer(
 }
 
 impl Geometry<'_> {
-    fn validate(&self) -> Result<(), EffectError> {
+    pub(crate) fn validate(&self) -> Result<(), EffectError> {
         self.view.validate()?;
         for item in self.items {
             item.validate()?;
@@ -216,40 +200,60 @@ impl Geometry<'_> {
         Ok(())
     }
 
-    fn target(&self, graph: &mut Graph, name: &str, format: Format) -> Texture {
+    pub(crate) fn target(&self, graph: &mut Graph, name: &str, format: Format) -> Texture {
         let [width, height] = self.size;
         graph.texture(name, TextureDesc::d2(width, height, format))
     }
 
+    /// How draws are compared with depth, which one, and what it holds before: that
+    /// of a prepass, or one of their own.
+    pub(crate) fn against(
+        &self,
+        graph: &mut Graph,
+        prepass: Option<&Prepass>,
+    ) -> (DepthState, Texture, Load) {
+        let nearer = self.view.nearer();
+        match prepass {
+            Some(prepass) => {
+                let equal = DepthState {
+                    compare: Compare::Equal,
+                    write: false,
+                    ..nearer
+                };
+                (equal, prepass.depth, Load::Keep)
+            }
+            None => {
+                let depth = self.target(graph, "depth", Format::Depth32Float);
+                let far = ClearValue::Float([self.view.far_depth(); 4]);
+                (nearer, depth, Load::Clear(far))
+            }
+        }
+    }
+
     /// A draw of every item: the weapon's first, then what stands still, then
     /// what moves.
-    fn draws<'i>(&'i self, draw: impl Fn(&'i Item) -> Draw) -> Vec<Draw> {
+    pub(crate) fn draws<'i>(&'i self, draw: impl Fn(&'i Item) -> Draw) -> Vec<Draw> {
         let seen = self.items.iter().filter(|item| !item.surface.is_cut_out());
         let mut items: Vec<&Item> = seen.collect();
         items.sort_by_key(|item| item.class);
         items.into_iter().map(draw).collect()
     }
 
+    /// A draw of an item's triangles with all that `lib/surface` asks for.
+    pub(crate) fn surfaced(&self, item: &Item, kernel: &'static str, depth: DepthState) -> Draw {
+        let draw = self.placed(item, kernel, Some(depth));
+        let normal = self.view.normal_matrix(item.world);
+        item.surface.set(draw.set("normal_view", normal.as_mat4()))
+    }
+
     /// A draw of an item's triangles where they are seen.
     fn placed(&self, item: &Item, kernel: &'static str, depth: Option<DepthState>) -> Draw {
         let world_view = self.view.view * item.world;
         let camera = &self.view.camera;
+        let depth = depth.unwrap_or_else(|| self.view.nearer());
         let mut draw = Draw::new(kernel)
             .elements(item.elements.clone())
-            .state(RasterState {
-                front: if world_view.determinant() < 0.0 {
-                    FrontFace::Clockwise
-                } else {
-                    FrontFace::CounterClockwise
-                },
-                cull: if item.surface.two_sided {
-                    CullMode::None
-                } else {
-                    CullMode::Back
-                },
-                depth: Some(depth.unwrap_or_else(|| self.view.nearer())),
-                ..RasterState::default()
-            })
+            .state(self.state(item, depth))
             .set("world_view", world_view.as_mat4())
             .set("projection_scale", camera.scale)
             .set("projection_centre", camera.centre)
@@ -264,9 +268,30 @@ impl Geometry<'_> {
     }
 }
 
+impl Geometry<'_> {
+    /// Which faces of an item are drawn, and how they are compared with depth.
+    pub(crate) fn state(&self, item: &Item, depth: DepthState) -> RasterState {
+        let world_view = self.view.view * item.world;
+        RasterState {
+            front: if world_view.determinant() < 0.0 {
+                FrontFace::Clockwise
+            } else {
+                FrontFace::CounterClockwise
+            },
+            cull: if item.surface.two_sided {
+                CullMode::None
+            } else {
+                CullMode::Back
+            },
+            depth: Some(depth),
+            ..RasterState::default()
+        }
+    }
+}
+
 impl View {
     /// Draws what is nearer.
-    fn nearer(&self) -> DepthState {
+    pub(crate) fn nearer(&self) -> DepthState {
         match self.camera.depth {
             DepthRange::ReversedInfinite | DepthRange::Reversed { .. } => DepthState::REVERSED,
             DepthRange::StandardInfinite | DepthRange::Standard { .. } => DepthState::STANDARD,

@@ -2,6 +2,8 @@
 
 #![allow(dead_code)] // Each test binary uses its own part.
 
+pub(crate) mod drawn;
+
 use etalon_core::Format;
 use etalon_core::backend::{Backend, Execution, Inputs};
 use etalon_core::graph::{Graph, Texture};

@@ -11,7 +11,7 @@ use etalon_core::resource::{AddressMode, BufferDesc, SamplerDesc, TextureDesc};
 use etalon_effects::geometry::{Item, Maps, Surface, View};
 use etalon_effects::lighting::PunctualLight;
 use etalon_effects::{CameraParams, DepthRange};
-use glam::{Vec2, Vec3, Vec4};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 
 use super::derive::tangents;
 use super::material::{AlphaMode, Material, TextureUse, UvTransform};
@@ -146,11 +146,35 @@ impl Imported<'_> {
     #[must_use]
     pub fn opaque_items(&self, model: &Model, snapshot: &Snapshot) -> Vec<Item> {
         let instances = snapshot.instances.all().iter();
-        let opaque = instances.filter(|instance| {
-            let material = &model.parts().materials[instance.material];
-            material.alpha != AlphaMode::Blend && material.transmission == 0.0
-        });
+        let opaque = instances.filter(|instance| !is_blended(model, instance));
         opaque.map(|instance| self.item(model, instance)).collect()
+    }
+
+    /// What of a snapshot is blended or lets light pass, from far to near as seen
+    /// from `eye`: to be drawn by [`etalon_effects::forward::glass`]. Of what lets
+    /// light pass, opacity is the part that does not.
+    ///
+    /// Distances are those of the centres of bounds.
+    #[must_use]
+    pub fn blended_items(&self, model: &Model, snapshot: &Snapshot, eye: DVec3) -> Vec<Item> {
+        let instances = snapshot.instances.all().iter();
+        let blended = instances.filter(|instance| is_blended(model, instance));
+        let mut far: Vec<_> = blended
+            .map(|instance| {
+                let [low, high] = model.parts().meshes[instance.mesh].bounds();
+                let centre =
+                    0.5 * (DVec3::from(low.map(f64::from)) + DVec3::from(high.map(f64::from)));
+                let placed = instance.world.as_dmat4().transform_point3(centre);
+                (placed.distance_squared(eye), instance)
+            })
+            .collect();
+        far.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+        let items = far.into_iter().map(|(_, instance)| {
+            let mut item = self.item(model, instance);
+            item.surface.base.w *= 1.0 - model.parts().materials[instance.material].transmission;
+            item
+        });
+        items.collect()
     }
 
     fn item(&self, model: &Model, instance: &Instance) -> Item {
@@ -207,6 +231,11 @@ impl Imported<'_> {
             sampler: sampler(first.unwrap_or_default()),
         }
     }
+}
+
+fn is_blended(model: &Model, instance: &Instance) -> bool {
+    let material = &model.parts().materials[instance.material];
+    material.alpha == AlphaMode::Blend || material.transmission > 0.0
 }
 
 /// The view of a camera for a picture of `size`.

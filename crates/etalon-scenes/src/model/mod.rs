@@ -9,6 +9,7 @@
 //! * [`shapes`]: meshes by closed forms.
 //! * [`gltf`]: models from glTF 2.0 files.
 //! * [`Drawable`]: what backends draw them from.
+//! * [`Shot`]: a model before a camera, with the passes that draw it.
 //! * [`flat_normals`], [`tangents`]: what meshes may come without.
 //! * [`crate::trace::TriangleScene`]: what rays see of a snapshot.
 //!
@@ -38,6 +39,7 @@ mod moment;
 mod node;
 mod parts;
 pub mod shapes;
+mod shot;
 mod texture;
 
 pub use animation::{Animation, Interpolation, Track, Values};
@@ -51,4 +53,5 @@ pub use mesh::{MAX_TRIANGLES, MAX_VERTICES, Mesh, Vertices};
 pub use moment::{Instance, Instances, Moment, PlacedLight, Snapshot};
 pub use node::{MAX_JOINTS, Node, Part, Skin, Transform};
 pub use parts::{MAX_INSTANCES, Model, ModelParts, Viewpoint};
+pub use shot::{Drawn, Shot, ShotError};
 pub use texture::{Filter, Image, MAX_IMAGE_SIDE, Sampler, Texture, Wrap};

@@ -366,6 +366,26 @@ fn bindings_are_in_order_of_number_and_unused_ones_are_named() {
 }
 
 #[test]
+fn unused_bindings_of_imported_files_are_named_as_well() {
+    let imported = "@group(0) @binding(1) var map: texture_2d<f32>;
+        @if(!strict) @group(0) @binding(2) var filtering: sampler;
+        fn read() -> vec4f {
+            @if(strict) return textureLoad(map, vec2u(), 0);
+            @if(!strict) return textureSampleLevel(map, filtering, vec2f(), 0.0);
+        }";
+    let text = kernel("import package::test::lib::read;", "var x = read();");
+    let files = [("test/lib", imported), ("test/one", text.as_str())];
+    let library = library(&files);
+    for (arithmetic, unused) in [
+        (Arithmetic::Strict, vec!["filtering"]),
+        (Arithmetic::Fast, vec![]),
+    ] {
+        let kernel = library.get(&KernelRequest::new("test/one"), arithmetic);
+        assert_eq!(kernel.unwrap().unused, unused, "{arithmetic:?}");
+    }
+}
+
+#[test]
 fn resources_of_imported_files_have_their_own_names() {
     let lib = "@group(0) @binding(5) var noise: texture_2d<f32>; fn f() -> f32 { return textureLoad(noise, vec2u(), 0).x; }";
     let kernel = |extra: &str| {

@@ -215,6 +215,30 @@ fn draws_are_planned_after_what_they_draw_over() {
     );
 }
 
+/// Drivers round otherwise what a format does not hold.
+#[test]
+fn targets_are_cleared_to_what_their_texels_hold() {
+    for (format, given, held) in [
+        // 0.3 of 255 is 76.5.
+        (Format::Rgba8Unorm, 0.299, 76.0 / 255.0),
+        // The unit of a half float at 0.05 is 2^-15; 0.05 is 1638.4 of them.
+        (Format::Rgba16Float, 0.05, 1638.0 / 32768.0),
+        (Format::R32Float, 0.05, 0.05),
+    ] {
+        let mut graph = Graph::new();
+        let target = graph.texture("target", TextureDesc::d2(4, 4, format));
+        let clear = Load::Clear(ClearValue::Float([given; 4]));
+        let pass = graph.raster("clear").colour("colour", target, clear);
+        let cleared = pass.finish().unwrap().texture("colour").unwrap();
+        graph.output("cleared", cleared).unwrap();
+        let plan = plan(&graph).unwrap();
+        match raster(&plan, 0).colours[0].clear {
+            Some(ClearValue::Float([red, ..])) => assert_eq!(red, held as f32, "{format}"),
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
 /// Depth that is compared and not changed is read, however many passes do so.
 #[test]
 fn depth_that_no_draw_writes_keeps_its_version() {

@@ -9,6 +9,7 @@ mod axis;
 mod cube;
 mod gather;
 mod general;
+mod levels;
 mod lod;
 
 use etalon_core::Format;
@@ -112,6 +113,10 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
                 }
                 _ => {
                     let mut derivatives = [[[0.0; K]; 3]; 2];
+                    let (rest, bias) = match rest {
+                        [derivatives @ .., bias] if sampling.bias => (derivatives, Some(*bias)),
+                        rest => (rest, None),
+                    };
                     let each = rest.chunks(request.axes.clamp(1, 3));
                     for (derivative, slots) in derivatives.iter_mut().zip(each) {
                         for (axis, slot) in derivative.iter_mut().zip(slots) {
@@ -119,7 +124,14 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
                         }
                     }
                     let [along_x, along_y] = &derivatives;
-                    Lod::Each(request.gradient(&place, along_x, along_y))
+                    let mut lods = request.gradient(&place, along_x, along_y);
+                    if let Some(bias) = bias {
+                        let bias: [f32; K] = state.singles(bias, chunk);
+                        for k in 0..K {
+                            lods[k] += bias[k];
+                        }
+                    }
+                    Lod::Each(lods)
                 }
             };
             let channels = request.sample::<I, K>(&place, &lod);
@@ -311,7 +323,11 @@ impl<'a> Request<'a> {
                     }
                 }
                 let mut both = sum;
-                self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
+                if self.axes == 2 && !self.cube {
+                    self.add_levels::<I, K>(&levels, linear, &scale, place, &mut both);
+                } else {
+                    self.add_general::<I, K>(&levels, linear, &scale, place, &mut both);
+                }
                 for (sum, both) in sum.iter_mut().zip(&both) {
                     for k in 0..K {
                         // A lane that reads one level only must not see the other.

@@ -407,6 +407,14 @@ fn targets(
                 value: value.kind(),
             });
         }
+        if let Load::Clear(ClearValue::Float([depth, ..])) = load
+            && is_depth
+            && !(0.0..=1.0).contains(depth)
+        {
+            return Err(refuse(format!(
+                "`{name}` is cleared to {depth}; depth is from 0 to 1"
+            )));
+        }
         let extent = desc.mip_extent(range.mip);
         let this = [extent.width, extent.height];
         match size {

@@ -17,7 +17,6 @@ use etalon_core::raster::{MAX_COLOUR_TARGETS, NumberKind, StepMode, TargetState,
 
 use super::{convert, does_nothing};
 use crate::check::Checker;
-use crate::depth;
 
 /// Checks targets and draws.
 pub(crate) fn check(checker: &Checker<'_>, step: &RasterStep) -> Result<(), BackendError> {
@@ -104,11 +103,8 @@ fn target(
         _ => return Err(checker.unsupported(format!("draws to {format} textures"))),
     };
     match (target.clear, format.sample_kind()) {
-        (Some(ClearValue::Float([value, ..])), SampleKind::Depth) => {
-            depth::check(value).map_err(|what| checker.unsupported(what))?;
-        }
         (None, _)
-        | (Some(ClearValue::Float(_)), SampleKind::Float)
+        | (Some(ClearValue::Float(_)), SampleKind::Float | SampleKind::Depth)
         | (Some(ClearValue::Sint(_)), SampleKind::Sint)
         | (Some(ClearValue::Uint(_)), SampleKind::Uint) => {}
         (Some(_), _) => {

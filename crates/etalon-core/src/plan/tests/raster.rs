@@ -430,6 +430,13 @@ fn targets_are_held_against_each_other() {
         &|pass| pass.colour("a", snorm, CLEAR).finish(),
         "renderable",
     );
+    for depth in [f32::NAN, -0.5, 1.5] {
+        let clear = Load::Clear(ClearValue::Float([depth; 4]));
+        refused(
+            &|pass| pass.depth(parts.depth, clear).finish(),
+            "depth is from 0 to 1",
+        );
+    }
     refused(
         &|pass| pass.colour("a", volume, CLEAR).finish(),
         "targets are 2D",

@@ -196,27 +196,6 @@ fn formats_that_a_device_does_not_draw_to_or_blend_are_refused() {
 }
 
 #[test]
-fn depths_outside_of_the_range_are_no_clear() {
-    on_vulkan(|backend| {
-        for bad in [f32::NAN, -0.5, 1.5] {
-            let mut scene = Scene::default();
-            let target = scene.target((2, 2), Format::Depth16Unorm);
-            let clear = Load::Clear(ClearValue::Float([bad; 4]));
-            let written = scene
-                .graph
-                .raster("draws")
-                .depth(target, clear)
-                .finish()
-                .unwrap();
-            let image = written.texture("depth").unwrap();
-            scene.graph.output("image", image).unwrap();
-            let error = scene.attempt(backend, &kernels()).unwrap_err();
-            unsupported(&error, "depth");
-        }
-    });
-}
-
-#[test]
 fn targets_over_the_limits_are_refused() {
     on_vulkan(|backend| {
         // Eight times sixteen bytes are over what most devices hold for a pixel.

@@ -1,9 +1,11 @@
 //! Rendering effects that run on any backend: each kernel is written once, in
 //! WGSL, and runs on a CPU interpreter, on wgpu and on Vulkan.
 //!
-//! * [`effects`]: reflections, exposure, bloom, tone mapping; each a function
-//!   from texture handles to texture handles, with a plain settings struct.
+//! * [`effects`]: geometry and its light, reflections, exposure, bloom, tone
+//!   mapping; each a function from texture handles to texture handles, with a
+//!   plain settings struct.
 //! * [`graph`]: what effects declare. Building a graph touches no device.
+//! * [`raster`]: the state of draws, and what vertex kernels are fed.
 //! * [`plan`]: what a graph becomes: only the passes that the requested outputs
 //!   need, in order, with memory shared and barriers placed.
 //! * [`kernel`]: where WESL sources become validated modules.
@@ -29,7 +31,9 @@
 
 #![forbid(unsafe_code)]
 
-pub use etalon_core::{Format, backend, format, graph, image, kernel, plan, resource, texel};
+pub use etalon_core::{
+    Format, backend, format, graph, image, kernel, plan, raster, resource, texel,
+};
 pub use etalon_effects as effects;
 
 #[cfg(feature = "ash")]

@@ -4,7 +4,7 @@ use super::{CLEAR, Scene, flat, kernels, positions, rectangle};
 use crate::common::{Route, on_vulkan, open, plan};
 use etalon_core::Format;
 use etalon_core::backend::{Backend, BackendError, Inputs};
-use etalon_core::graph::{Buffer, ClearValue, Draw, Load, ResourceDesc};
+use etalon_core::graph::{Buffer, ClearValue, Draw, ResourceDesc};
 use etalon_core::plan::{Capture, DrawExtent, Plan, RasterStep, Step};
 use etalon_core::raster::{Blend, DepthState, IndexFormat, RasterState, TargetState, VertexFormat};
 use etalon_wgpu::WgpuBackend;

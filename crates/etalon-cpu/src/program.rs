@@ -70,6 +70,19 @@ pub enum BoundResource<'a> {
     Sampler(SamplerDesc),
 }
 
+/// Where a kernel's spans are in the files that it was made of.
+pub(crate) fn locate_of(kernel: &Arc<Kernel>) -> impl Fn(Span) -> Location + Send + Sync + use<> {
+    let kernel = Arc::clone(kernel);
+    move |span| {
+        let place = kernel.source_map.locate(span);
+        Location {
+            file: place.file,
+            line: place.line,
+            column: place.column,
+        }
+    }
+}
+
 /// Where a module's spans are in the source.
 pub(crate) fn locate_in(name: String, source: String) -> impl Fn(Span) -> Location + Send + Sync {
     move |span| match span.to_range() {
@@ -144,18 +157,9 @@ impl Program {
         kernel: &Arc<Kernel>,
         options: &TranslateOptions,
     ) -> Result<Self, TranslateError> {
-        let source = Arc::clone(kernel);
-        let locate = move |span| {
-            let place = source.source_map.locate(span);
-            Location {
-                file: place.file,
-                line: place.line,
-                column: place.column,
-            }
-        };
         Self::new(
             kernel.name.clone(),
-            Box::new(locate),
+            Box::new(locate_of(kernel)),
             &kernel.module,
             &kernel.info,
             kernel

@@ -14,7 +14,8 @@ use etalon_core::raster::{VertexAttribute, VertexLayout};
 use super::histories::clear_texel;
 use super::resources::Resources;
 use super::{CpuBackend, malformed};
-use crate::error::{Location, RunError};
+use crate::error::RunError;
+use crate::program::locate_of;
 use crate::raster::{
     DrawRange, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram, VertexBuffer,
 };
@@ -69,15 +70,6 @@ fn failed(step: &str, error: RasterError) -> BackendError {
 }
 
 fn translate(kernel: &Arc<Kernel>, form: &DrawForm) -> Result<RasterProgram, RasterError> {
-    let source = Arc::clone(kernel);
-    let locate = move |span| {
-        let place = source.source_map.locate(span);
-        Location {
-            file: place.file,
-            line: place.line,
-            column: place.column,
-        }
-    };
     let (vertex, fragment) = match kernel.raster() {
         Some(stages) => (
             stages.vertex.entry_point.as_str(),
@@ -97,7 +89,13 @@ fn translate(kernel: &Arc<Kernel>, form: &DrawForm) -> Result<RasterProgram, Ras
         depth: form.depth,
     };
     let name = kernel.name.clone();
-    RasterProgram::new(name, Box::new(locate), &kernel.module, &kernel.info, &desc)
+    RasterProgram::new(
+        name,
+        Box::new(locate_of(kernel)),
+        &kernel.module,
+        &kernel.info,
+        &desc,
+    )
 }
 
 impl CpuBackend {

@@ -17,7 +17,7 @@ use etalon_tests::{executors, plan_for};
 fn graph(frame: &Frame, effect: &EffectEntry) -> Graph {
     let mut graph = Graph::new();
     let inputs = frame.import(&mut graph, 1.0 / 60.0).expect("a fresh graph");
-    let result = (effect.build)(&mut graph, &inputs).expect("default settings");
+    let result = effect.build(&mut graph, &inputs).expect("default settings");
     graph.output("result", result).expect("the only output");
     graph
 }

@@ -21,7 +21,7 @@ fn every_pass_of_every_effect_is_bit_equal_on_every_backend() {
                 executor.reset_histories();
                 let mut graph = Graph::new();
                 let inputs = frame.import(&mut graph, 1.0 / 60.0).unwrap();
-                let result = (effect.build)(&mut graph, &inputs).unwrap();
+                let result = effect.build(&mut graph, &inputs).unwrap();
                 graph.output("result", result).unwrap();
                 let plan = plan_for(
                     executor.as_ref(),

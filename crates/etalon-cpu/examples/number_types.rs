@@ -40,7 +40,7 @@ fn main() -> Result<(), Failure> {
                 }
                 let mut graph = Graph::new();
                 let inputs = frame.import(&mut graph, 1.0 / 60.0)?;
-                let result = (effect.build)(&mut graph, &inputs)?;
+                let result = effect.build(&mut graph, &inputs)?;
                 graph.output("result", result)?;
                 let options = PlanOptions {
                     arithmetic,

@@ -21,7 +21,7 @@ fn backend(number_type: NumberType, tier: Tier, threads: usize) -> CpuBackend {
 fn plan(backend: &CpuBackend, frame: &Frame, effect: &EffectEntry, arithmetic: Arithmetic) -> Plan {
     let mut graph = Graph::new();
     let inputs = frame.import(&mut graph, 1.0 / 60.0).unwrap();
-    let result = (effect.build)(&mut graph, &inputs).unwrap();
+    let result = effect.build(&mut graph, &inputs).unwrap();
     graph.output("result", result).unwrap();
     let options = PlanOptions {
         arithmetic,

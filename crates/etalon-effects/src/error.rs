@@ -4,6 +4,8 @@ use etalon_core::graph::GraphError;
 use etalon_core::image::ImageError;
 use thiserror::Error;
 
+use crate::knob::KnobError;
+
 /// A setting outside of its range.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{effect}: `{field}` is {value}; it must be a number from {min} to {max}")]
@@ -27,6 +29,9 @@ pub enum EffectError {
     /// A setting outside of its range.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// A setting by a name that there is not, or of a kind that it is not.
+    #[error(transparent)]
+    Knob(#[from] KnobError),
     /// Two inputs that must cover the same picture differ in size.
     #[error("{effect}: `{first}` is {}×{} texels, but `{second}` is {}×{}; they must be equal", .first_size[0], .first_size[1], .second_size[0], .second_size[1])]
     SizeMismatch {

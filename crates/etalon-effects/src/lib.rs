@@ -40,6 +40,7 @@ mod error;
 pub mod exposure;
 pub mod forward;
 pub mod geometry;
+pub mod knob;
 pub mod lighting;
 pub mod registry;
 mod scene;

@@ -7,8 +7,12 @@ use crate::bloom::{Bloom, bloom};
 use crate::chain::{ChainSettings, chain};
 use crate::composite::{Composite, composite};
 use crate::exposure::{Exposed, Exposure, exposure};
+use crate::knob::{KnobError, KnobInfo, KnobValue, Tunable, infos, tuned};
 use crate::ssr::{Ssr, ssr};
 use crate::{EffectError, SceneInputs};
+
+/// Declares an effect with some knobs set and returns its result.
+type Declare = fn(&mut Graph, &SceneInputs, &[(&str, KnobValue)]) -> Result<Texture, EffectError>;
 
 /// An effect that can be built on any scene.
 #[derive(Clone, Copy, Debug)]
@@ -17,52 +21,91 @@ pub struct EffectEntry {
     pub name: &'static str,
     /// What it does, in a sentence.
     pub description: &'static str,
+    knobs: fn() -> Vec<KnobInfo>,
+    declare: Declare,
+}
+
+impl EffectEntry {
+    const fn of<S: Tunable>(description: &'static str, declare: Declare) -> Self {
+        Self {
+            name: S::EFFECT,
+            description,
+            knobs: infos::<S>,
+            declare,
+        }
+    }
+
+    /// Its settings as data; none for `chain`, which has those of all others.
+    #[must_use]
+    pub fn knobs(&self) -> Vec<KnobInfo> {
+        (self.knobs)()
+    }
+
     /// Declares it with default settings and returns its result.
-    pub build: fn(&mut Graph, &SceneInputs) -> Result<Texture, EffectError>,
+    ///
+    /// # Errors
+    /// If the inputs do not fit together.
+    pub fn build(&self, graph: &mut Graph, inputs: &SceneInputs) -> Result<Texture, EffectError> {
+        self.build_with(graph, inputs, &[])
+    }
+
+    /// Declares it with some knobs set, the others as they are by default.
+    ///
+    /// # Errors
+    /// If there is no such knob, a value is not allowed, or the inputs do not fit
+    /// together.
+    pub fn build_with(
+        &self,
+        graph: &mut Graph,
+        inputs: &SceneInputs,
+        values: &[(&str, KnobValue)],
+    ) -> Result<Texture, EffectError> {
+        (self.declare)(graph, inputs, values)
+    }
 }
 
 /// All effects, and `chain`, which is all of them one after the other.
 #[must_use]
 pub const fn effects() -> &'static [EffectEntry] {
-    &[
-        EffectEntry {
-            name: "ssr",
-            description: "Screen-space reflection by a march across the screen and bisection",
-            build: |graph, inputs| ssr(graph, inputs, &Ssr::default()),
-        },
-        EffectEntry {
-            name: "exposure",
-            description: "Automatic exposure from the picture's average luminance",
-            build: |graph, inputs| {
-                exposure(
-                    graph,
-                    inputs.colour,
-                    inputs.delta_time,
-                    &Exposure::default(),
-                )
-            },
-        },
-        EffectEntry {
-            name: "bloom",
-            description: "The glow of bright light, by halving and doubling the picture's size",
-            build: |graph, inputs| {
-                bloom(graph, inputs.colour, Exposed::default(), &Bloom::default())
-            },
-        },
-        EffectEntry {
-            name: "composite",
-            description: "Tone curve and encoding for the display",
-            build: |graph, inputs| {
-                composite(graph, inputs.colour, None, None, &Composite::default())
-            },
-        },
-        EffectEntry {
-            name: "chain",
-            description: "Reflection, exposure, bloom and composite, one after the other",
-            build: |graph, inputs| Ok(chain(graph, inputs, &ChainSettings::full())?.picture),
-        },
-    ]
+    EFFECTS
 }
+
+const EFFECTS: &[EffectEntry] = &[
+    EffectEntry::of::<Ssr>(
+        "Screen-space reflection by a march across the screen and bisection",
+        |graph, inputs, values| ssr(graph, inputs, &tuned(values)?),
+    ),
+    EffectEntry::of::<Exposure>(
+        "Automatic exposure from the picture's average luminance",
+        |graph, inputs, values| exposure(graph, inputs.colour, inputs.delta_time, &tuned(values)?),
+    ),
+    EffectEntry::of::<Bloom>(
+        "The glow of bright light, by halving and doubling the picture's size",
+        |graph, inputs, values| bloom(graph, inputs.colour, Exposed::default(), &tuned(values)?),
+    ),
+    EffectEntry::of::<Composite>(
+        "Tone curve and encoding for the display",
+        |graph, inputs, values| composite(graph, inputs.colour, None, None, &tuned(values)?),
+    ),
+    EffectEntry {
+        name: CHAIN,
+        description: "Reflection, exposure, bloom and composite, one after the other",
+        knobs: Vec::new,
+        declare: |graph, inputs, values| {
+            if let Some((knob, _)) = values.first() {
+                return Err(KnobError::Unknown {
+                    effect: CHAIN,
+                    knob: (*knob).to_owned(),
+                    known: Vec::new(),
+                }
+                .into());
+            }
+            Ok(chain(graph, inputs, &ChainSettings::full())?.picture)
+        },
+    },
+];
+
+const CHAIN: &str = "chain";
 
 /// The effect of that name.
 #[must_use]

@@ -29,7 +29,7 @@ fn effects_hide_nothing() {
                 let mut run = Run::new();
                 run.arithmetic = arithmetic;
                 let inputs = run.import_frame(&frame);
-                let result = (effect.build)(&mut run.graph, &inputs).unwrap();
+                let result = effect.build(&mut run.graph, &inputs).unwrap();
                 run.graph.output("result", result).unwrap();
                 // The second frame has histories.
                 for _ in 0..2 {

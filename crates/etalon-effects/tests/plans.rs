@@ -56,7 +56,7 @@ fn every_registered_effect_plans_strict_and_fast() {
         for (width, height) in [(64, 48), (1, 1), (1, 37), (4096, 1), (31, 17)] {
             let mut graph = Graph::new();
             let inputs = inputs(&mut graph, width, height);
-            let result = (entry.build)(&mut graph, &inputs).expect(entry.name);
+            let result = entry.build(&mut graph, &inputs).expect(entry.name);
             graph.output("result", result).expect(entry.name);
             for arithmetic in BOTH {
                 let plan = plan(&graph, &kernels, arithmetic);
@@ -192,7 +192,7 @@ fn bloom_stops_halving_at_one_texel() {
     let mut graph = Graph::new();
     let inputs = inputs(&mut graph, 5, 1);
     let entry = etalon_effects::effect("bloom").expect("registered");
-    let result = (entry.build)(&mut graph, &inputs).expect("valid");
+    let result = entry.build(&mut graph, &inputs).expect("valid");
     graph.output("bloom", result).expect("written");
     let plan = plan(&graph, &kernels, Arithmetic::Strict);
     let downs = kernels_of(&plan)
@@ -249,7 +249,7 @@ fn handles_of_another_graph_are_refused() {
     let foreign = inputs(&mut other, 64, 48);
     for entry in effects() {
         let mut graph = Graph::new();
-        let result = (entry.build)(&mut graph, &foreign);
+        let result = entry.build(&mut graph, &foreign);
         assert!(
             matches!(result, Err(EffectError::Graph(_))),
             "{}: {result:?}",

@@ -85,6 +85,13 @@ const ARITHMETIC: Targets = Targets {
 
 type Build = fn(&mut Graph, &SceneInputs) -> Result<Texture, EffectError>;
 
+/// Where a graph comes from.
+#[derive(Clone, Copy, Debug)]
+enum Origin {
+    Effect(&'static EffectEntry),
+    Small(Build),
+}
+
 /// Something to measure.
 #[derive(Clone, Copy, Debug)]
 pub struct Subject {
@@ -92,7 +99,7 @@ pub struct Subject {
     pub name: &'static str,
     /// What is aimed at.
     pub targets: Targets,
-    build: Build,
+    origin: Origin,
     /// Whether it can be had in strict arithmetic.
     strict: bool,
 }
@@ -123,33 +130,33 @@ fn small() -> [Subject; 3] {
         Subject {
             name: "arithmetic",
             targets: ARITHMETIC,
-            build: |graph, inputs| {
+            origin: Origin::Small(|graph, inputs| {
                 let result = target(graph, inputs, Format::R32Float);
                 Ok(graph
                     .compute("measure/arithmetic")
                     .write("result", result)
                     .set("offset", 0.375)
                     .per_texel("result")?)
-            },
+            }),
             strict: true,
         },
         Subject {
             name: "arithmetic-chains",
             targets: ARITHMETIC,
-            build: |graph, inputs| {
+            origin: Origin::Small(|graph, inputs| {
                 let result = target(graph, inputs, Format::R32Float);
                 Ok(graph
                     .compute("measure/arithmetic_chains")
                     .write("result", result)
                     .set("offset", 0.375)
                     .per_texel("result")?)
-            },
+            }),
             strict: true,
         },
         Subject {
             name: "bilinear",
             targets: EFFECTS,
-            build: |graph, inputs| {
+            origin: Origin::Small(|graph, inputs| {
                 let result = target(graph, inputs, Format::Rgba16Float);
                 Ok(graph
                     .compute("measure/bilinear")
@@ -157,27 +164,30 @@ fn small() -> [Subject; 3] {
                     .sampler("linear", SamplerDesc::LINEAR_CLAMP)
                     .write("result", result)
                     .per_texel("result")?)
-            },
+            }),
             // Samplers' weights are their own.
             strict: false,
         },
     ]
 }
 
+fn of_effect(entry: &'static EffectEntry) -> Subject {
+    Subject {
+        name: entry.name,
+        targets: EFFECTS,
+        origin: Origin::Effect(entry),
+        strict: true,
+    }
+}
+
 /// Everything there is to measure: the effects in the registry's order, but
 /// for `chain`, whose kernels are theirs; then the small kernels.
 #[must_use]
 pub fn subjects() -> Vec<Subject> {
-    let effect = |entry: &EffectEntry| Subject {
-        name: entry.name,
-        targets: EFFECTS,
-        build: entry.build,
-        strict: true,
-    };
     effects()
         .iter()
         .filter(|entry| entry.name != "chain")
-        .map(effect)
+        .map(of_effect)
         .chain(small())
         .collect()
 }
@@ -195,13 +205,8 @@ pub fn names() -> Vec<&'static str> {
 /// [`SubjectError::Unknown`] if there is none.
 pub fn subject(name: &str) -> Result<Subject, SubjectError> {
     let entry = effects().iter().find(|entry| entry.name == name);
-    let effect = entry.map(|entry| Subject {
-        name: entry.name,
-        targets: EFFECTS,
-        build: entry.build,
-        strict: true,
-    });
-    effect
+    entry
+        .map(of_effect)
         .or_else(|| small().into_iter().find(|subject| subject.name == name))
         .ok_or_else(|| SubjectError::Unknown {
             name: name.to_owned(),
@@ -231,7 +236,10 @@ impl Subject {
     pub fn graph(&self, frame: &Frame) -> Result<Graph, SubjectError> {
         let mut graph = Graph::new();
         let inputs = frame.import(&mut graph, DELTA_TIME)?;
-        let result = (self.build)(&mut graph, &inputs)?;
+        let result = match self.origin {
+            Origin::Effect(entry) => entry.build(&mut graph, &inputs)?,
+            Origin::Small(build) => build(&mut graph, &inputs)?,
+        };
         graph.output("result", result)?;
         Ok(graph)
     }

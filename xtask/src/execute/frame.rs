@@ -234,7 +234,7 @@ impl Content {
                 drawn.inputs
             }
         };
-        let result = (effect.build)(&mut graph, &inputs)?;
+        let result = effect.build(&mut graph, &inputs)?;
         graph.output("result", result)?;
         Ok(graph)
     }

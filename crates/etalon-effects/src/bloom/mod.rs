@@ -11,12 +11,48 @@
 //! B. Karis, "Tone mapping", 2013: the weighting against flicker.
 
 use etalon_core::Format;
-use etalon_core::graph::{Graph, Texture};
+use etalon_core::graph::{ComputePass, Graph, Texture};
 use etalon_core::resource::{AddressMode, Filter, SamplerDesc};
 
-use crate::check::Settings;
 use crate::exposure::Exposed;
+use crate::knob::{Tunable, choices, knobs};
 use crate::{EffectError, SettingError};
+
+/// What the levels of the chain are stored in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LightStorage {
+    /// `rg11b10ufloat`: half the bytes of a half float, and a step of 1/64 of the
+    /// value (1/32 in blue), so that hues drift over the levels. Not every device
+    /// can store to it; planning says so.
+    Packed,
+    /// `rgba16float`: steps of 1/2048 of the value.
+    #[default]
+    Half,
+    /// `rgba32float`: twice the bytes, no rounding to be seen.
+    Full,
+}
+
+choices!(LightStorage {
+    Packed => "rg11b10ufloat",
+    Half => "rgba16float",
+    Full => "rgba32float",
+});
+
+impl LightStorage {
+    const fn format(self) -> Format {
+        match self {
+            Self::Packed => Format::Rg11b10Ufloat,
+            Self::Half => Format::Rgba16Float,
+            Self::Full => Format::Rgba32Float,
+        }
+    }
+
+    /// Tells a kernel which variant to be.
+    fn set(self, pass: ComputePass<'_>) -> ComputePass<'_> {
+        pass.feature("packed", self == Self::Packed)
+            .feature("full", self == Self::Full)
+    }
+}
 
 /// Settings of [`bloom`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,7 +76,19 @@ pub struct Bloom {
     pub scatter: f32,
     /// How much of the bloom is added to the picture, in `[0, 16]`.
     pub intensity: f32,
+    /// What the levels are stored in.
+    pub storage: LightStorage,
 }
+
+knobs!(Bloom, "bloom" {
+    real threshold [0.0, 65_504.0] "exposed light", Look [0.0, 1.0, 4.0], "brightness from which on light blooms";
+    real knee [0.0, 1.0] "", Look [0.0, 0.5, 1.0], "softness of the threshold";
+    choice suppress_fireflies [bool] "", Look ["off", "on"], "whether single bright texels weigh less";
+    count levels [1, 12] "", Accuracy [1, 2, 3, 4, 5, 6, 7, 8, 9], "how many times the picture is halved";
+    real scatter [0.0, 1.0] "", Look [0.3, 0.6, 0.9], "share of the wider blur at each level";
+    real intensity [0.0, 16.0] "", Look [0.1, 0.3, 1.0], "how much of the bloom is added";
+    choice storage [LightStorage] "", Accuracy ["rg11b10ufloat", "rgba16float", "rgba32float"], "what the levels are stored in";
+});
 
 impl Default for Bloom {
     fn default() -> Self {
@@ -51,6 +99,7 @@ impl Default for Bloom {
             levels: 6,
             scatter: 0.6,
             intensity: 0.3,
+            storage: LightStorage::Half,
         }
     }
 }
@@ -61,12 +110,7 @@ impl Bloom {
     /// # Errors
     /// The first field outside of it.
     pub fn validate(&self) -> Result<(), SettingError> {
-        let check = Settings("bloom");
-        check.range("threshold", self.threshold, 0.0, 65_504.0)?;
-        check.range("knee", self.knee, 0.0, 1.0)?;
-        check.count("levels", self.levels, 1, 12)?;
-        check.range("scatter", self.scatter, 0.0, 1.0)?;
-        check.range("intensity", self.intensity, 0.0, 16.0)
+        self.check_knobs()
     }
 }
 
@@ -76,8 +120,8 @@ pub(crate) const LINEAR: SamplerDesc =
 
 /// The bloom of `colour`, exposed.
 ///
-/// The result is `rgba16float` of half the size of `colour`, rounded up, with
-/// alpha 1. `settings.intensity` is for whoever adds it to the picture.
+/// The result is of half the size of `colour`, rounded up, and of the format of
+/// `settings.storage`, with alpha 1. `settings.intensity` is for whoever adds it to the picture.
 ///
 /// # Errors
 /// If a setting or the exposure is out of range.
@@ -89,7 +133,10 @@ pub fn bloom(
 ) -> Result<Texture, EffectError> {
     settings.validate()?;
     exposed.validate("bloom")?;
-    let mut desc = graph.desc(colour).with_format(Format::Rgba16Float).half();
+    let mut desc = graph
+        .desc(colour)
+        .with_format(settings.storage.format())
+        .half();
     let result = graph.texture("bloom.down 1", desc);
     let mut pass = graph
         .compute("bloom/threshold")
@@ -103,32 +150,31 @@ pub fn bloom(
     if let Some(adaptation) = exposed.adaptation {
         pass = pass.read("adaptation", adaptation);
     }
-    let mut levels = vec![pass.per_texel("result")?];
+    let mut levels = vec![settings.storage.set(pass).per_texel("result")?];
     while levels.len() < settings.levels as usize
         && (desc.extent.width > 1 || desc.extent.height > 1)
     {
         desc = desc.half();
         let result = graph.texture(format!("bloom.down {}", levels.len() + 1), desc);
         let source = levels[levels.len() - 1];
-        let level = graph
+        let pass = graph
             .compute("bloom/downsample")
             .read("source", source)
             .write("result", result)
-            .sampler("linear", LINEAR)
-            .per_texel("result")?;
-        levels.push(level);
+            .sampler("linear", LINEAR);
+        levels.push(settings.storage.set(pass).per_texel("result")?);
     }
     let mut newest = levels[levels.len() - 1];
     for (level, &fine) in levels.iter().enumerate().rev().skip(1) {
         let result = graph.texture(format!("bloom.up {}", level + 1), graph.desc(fine));
-        newest = graph
+        let pass = graph
             .compute("bloom/upsample")
             .read("fine", fine)
             .read("coarse", newest)
             .write("result", result)
             .set("scatter", settings.scatter)
-            .sampler("linear", LINEAR)
-            .per_texel("result")?;
+            .sampler("linear", LINEAR);
+        newest = settings.storage.set(pass).per_texel("result")?;
     }
     Ok(newest)
 }

@@ -7,6 +7,7 @@ use etalon_core::resource::TextureDesc;
 use crate::bloom::LINEAR;
 use crate::check::{Settings, same_size, size};
 use crate::exposure::Exposed;
+use crate::knob::{Choice, Tunable, knobs};
 use crate::{EffectError, SettingError};
 
 /// How light is brought into the range of a display. Sources and formulas are
@@ -68,6 +69,25 @@ impl Default for Output {
     }
 }
 
+impl Choice for Output {
+    const NAMES: &'static [&'static str] = &["linear", "reinhard", "aces", "neutral", "agx", "hdr"];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Sdr(curve) => Self::NAMES[curve.number() as usize],
+            Self::Hdr => "hdr",
+        }
+    }
+
+    fn named(name: &str) -> Option<Self> {
+        if name == "hdr" {
+            return Some(Self::Hdr);
+        }
+        let named = |curve: &ToneCurve| Self::Sdr(*curve).name() == name;
+        ToneCurve::ALL.into_iter().find(named).map(Self::Sdr)
+    }
+}
+
 /// Settings of [`composite`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Composite {
@@ -77,6 +97,11 @@ pub struct Composite {
     /// What is produced.
     pub output: Output,
 }
+
+knobs!(Composite, "composite" {
+    real exposure [0.0, 1e6] "", Look [0.5, 1.0, 2.0], "factor on the light";
+    choice output [Output] "", Look ["linear", "reinhard", "aces", "neutral", "agx", "hdr"], "tone curve, or none and linear light";
+});
 
 impl Default for Composite {
     fn default() -> Self {
@@ -93,11 +118,10 @@ impl Composite {
     /// # Errors
     /// The first field outside of it.
     pub fn validate(&self) -> Result<(), SettingError> {
-        let check = Settings("composite");
-        check.range("exposure", self.exposure, 0.0, 1e6)?;
+        self.check_knobs()?;
         match self.output {
             Output::Sdr(ToneCurve::Reinhard { white }) => {
-                check.range("white", white, 1e-2, 65_504.0)
+                Settings(Self::EFFECT).range("white", white, 1e-2, 65_504.0)
             }
             Output::Sdr(_) | Output::Hdr => Ok(()),
         }

@@ -17,6 +17,7 @@ use etalon_core::graph::{ClearValue, Graph, Texture};
 use etalon_core::resource::TextureDesc;
 
 use crate::check::Settings;
+use crate::knob::{Tunable, choices, knobs};
 use crate::{EffectError, SettingError};
 
 /// Which average of the luminance is metered.
@@ -30,6 +31,11 @@ pub enum Metering {
     #[default]
     Logarithmic,
 }
+
+choices!(Metering {
+    Arithmetic => "arithmetic",
+    Logarithmic => "logarithmic",
+});
 
 /// Settings of [`exposure`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,6 +60,16 @@ pub struct Exposure {
     pub speed_down: f32,
 }
 
+knobs!(Exposure, "exposure" {
+    choice metering [Metering] "", Look ["arithmetic", "logarithmic"], "which average is metered";
+    real key [1e-4, 10.0] "luminance", Look [0.09, 0.18, 0.36], "what the average is brought to";
+    real compensation [-16.0, 16.0] "stops", Look [-1.0, 0.0, 1.0], "brighter or darker than that";
+    real min_luminance [1e-6, 65_504.0] "luminance", Look [1e-4, 1e-3, 1e-2], "darkest luminance adapted to";
+    real max_luminance [1e-6, 65_504.0] "luminance", Look [1e2, 1e4], "brightest luminance adapted to";
+    real speed_up [0.0, 1e4] "1/s", Look [1.0, 3.0, 10.0], "how fast a brighter scene is followed";
+    real speed_down [0.0, 1e4] "1/s", Look [0.5, 1.0, 10.0], "how fast a darker scene is followed";
+});
+
 impl Default for Exposure {
     fn default() -> Self {
         Self {
@@ -74,18 +90,13 @@ impl Exposure {
     /// # Errors
     /// The first field outside of it.
     pub fn validate(&self) -> Result<(), SettingError> {
-        let check = Settings("exposure");
-        check.range("key", self.key, 1e-4, 10.0)?;
-        check.range("compensation", self.compensation, -16.0, 16.0)?;
-        check.range("min_luminance", self.min_luminance, 1e-6, 65_504.0)?;
-        check.range(
+        self.check_knobs()?;
+        Settings(Self::EFFECT).range(
             "max_luminance",
             self.max_luminance,
             self.min_luminance,
             65_504.0,
-        )?;
-        check.range("speed_up", self.speed_up, 0.0, 1e4)?;
-        check.range("speed_down", self.speed_down, 0.0, 1e4)
+        )
     }
 
     fn metering(&self) -> f64 {

@@ -22,8 +22,50 @@ use etalon_core::resource::TextureDesc;
 use glam::IVec2;
 
 use crate::check::{Settings, same_size, size};
+use crate::knob::{Tunable, choices, knobs};
 use crate::scene::CameraParams;
 use crate::{EffectError, SceneInputs, SettingError};
+
+/// How the screen is searched along a ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Search {
+    /// One texel after the other, or what `resolution` leaves of them: the hit is
+    /// wherever the step ends that found it.
+    Linear,
+    /// The same, and then bisection between the last miss and the hit.
+    #[default]
+    Refined,
+}
+
+choices!(Search {
+    Linear => "linear",
+    Refined => "refined",
+});
+
+/// What the place and length of a reflection are stored in between the passes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HitStorage {
+    /// `rgba32float`: places to a small part of a texel.
+    #[default]
+    Full,
+    /// `rgba16float`: half the bytes; places are rounded to 2^-12 of the picture
+    /// on its far half, which is a third of a texel at a width of 1280.
+    Half,
+}
+
+choices!(HitStorage {
+    Full => "rgba32float",
+    Half => "rgba16float",
+});
+
+impl HitStorage {
+    const fn format(self) -> Format {
+        match self {
+            Self::Full => Format::Rgba32Float,
+            Self::Half => Format::Rgba16Float,
+        }
+    }
+}
 
 /// How a reflection is put onto the scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,6 +77,11 @@ pub enum Blend {
     Replace,
 }
 
+choices!(Blend {
+    Add => "add",
+    Replace => "replace",
+});
+
 /// Settings of [`ssr`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ssr {
@@ -45,9 +92,11 @@ pub struct Ssr {
     /// every one; ½ every second, at half the cost, missing what is thinner
     /// than two texels. 0 turns the effect off.
     pub resolution: f32,
-    /// Halvings of the step in which the hit was found, in `[0, 24]`. Each
-    /// costs one look-up and halves the position error; with the resolution at
-    /// 1 none shows beyond 4, since a texel has one depth.
+    /// How the screen is searched.
+    pub search: Search,
+    /// Halvings of the step in which the hit was found, in `[0, 24]`, where the
+    /// search is refined. Each costs one look-up and halves the position error;
+    /// with the resolution at 1 none shows beyond 4, since a texel has one depth.
     pub steps: u32,
     /// How far behind a surface still counts as inside of it, in view units,
     /// in `[1e-6, 1e6]`. Too large smears the outlines of things along the
@@ -73,15 +122,34 @@ pub struct Ssr {
     /// blurred over, in `[0, 64]`. The cost grows with it; 0 skips the blur and
     /// shows every surface smooth.
     pub blur_radius: u32,
+    /// What places and lengths of reflections are stored in.
+    pub storage: HitStorage,
     /// How the reflection is put onto the scene.
     pub blend: Blend,
 }
+
+knobs!(Ssr, "ssr" {
+    real max_distance [1e-3, 1e6] "view units", Look [5.0, 20.0, 100.0], "longest ray";
+    real resolution [0.0, 1.0] "", Accuracy [0.0625, 0.125, 0.25, 0.5, 1.0], "share of the texels along a ray that are looked at";
+    choice search [Search] "", Accuracy ["linear", "refined"], "how the screen is searched";
+    count steps [0, 24] "", Accuracy [1, 2, 3, 5, 8, 12], "halvings of the step that found the hit";
+    real thickness [1e-6, 1e6] "view units", Look [0.05, 0.25, 1.0], "how far behind a surface counts as inside of it";
+    count march_limit [1, 23_171] "", Accuracy [32, 128, 512, 4096], "most texels looked at along one ray";
+    real camera_fade [0.0, 1.0] "", Look [0.0, 0.5, 1.0], "fade of rays that turn back to the eye";
+    real depth_fade [0.0, 1.0] "", Look [0.0, 0.5, 1.0], "fade by the depth of a hit behind its surface";
+    real distance_fade [0.0, 1.0] "", Look [0.0, 0.5, 1.0], "fade by the length of the ray";
+    real border [0.0, 0.5] "", Look [0.0, 0.1, 0.25], "width of the band along the edges in which reflections fade out";
+    count blur_radius [0, 64] "texels", Look [0, 2, 6, 16], "reach of the blur on rough surfaces";
+    choice storage [HitStorage] "", Accuracy ["rgba16float", "rgba32float"], "what places of reflections are stored in";
+    choice blend [Blend] "", Look ["add", "replace"], "how the reflection is put onto the scene";
+});
 
 impl Default for Ssr {
     fn default() -> Self {
         Self {
             max_distance: 20.0,
             resolution: 1.0,
+            search: Search::Refined,
             steps: 5,
             thickness: 0.25,
             march_limit: 4096,
@@ -90,6 +158,7 @@ impl Default for Ssr {
             distance_fade: 1.0,
             border: 0.1,
             blur_radius: 6,
+            storage: HitStorage::Full,
             blend: Blend::Add,
         }
     }
@@ -101,17 +170,7 @@ impl Ssr {
     /// # Errors
     /// The first field outside of it.
     pub fn validate(&self) -> Result<(), SettingError> {
-        let check = Settings("ssr");
-        check.range("max_distance", self.max_distance, 1e-3, 1e6)?;
-        check.range("resolution", self.resolution, 0.0, 1.0)?;
-        check.count("steps", self.steps, 0, 24)?;
-        check.range("thickness", self.thickness, 1e-6, 1e6)?;
-        check.count("march_limit", self.march_limit, 1, 23_171)?;
-        check.range("camera_fade", self.camera_fade, 0.0, 1.0)?;
-        check.range("depth_fade", self.depth_fade, 0.0, 1.0)?;
-        check.range("distance_fade", self.distance_fade, 0.0, 1.0)?;
-        check.range("border", self.border, 0.0, 0.5)?;
-        check.count("blur_radius", self.blur_radius, 0, 64)
+        self.check_knobs()
     }
 }
 
@@ -155,9 +214,9 @@ pub fn ssr(
 
 /// Finds what each pixel mirrors.
 ///
-/// The result is `rgba32float` of the size of `depth`: u and v of the place,
-/// its visibility in `[0, 1]`, and the length of the ray in view units; all 0
-/// where nothing is mirrored.
+/// The result has the size of `depth` and the format of `settings.storage`: u and
+/// v of the place, its visibility in `[0, 1]`, and the length of the ray in view
+/// units; all 0 where nothing is mirrored.
 ///
 /// # Errors
 /// If a setting is out of range, the resolution is 0, or the inputs differ in size.
@@ -177,19 +236,24 @@ pub fn march(
         ("depth", size(graph, depth)),
         ("normal", size(graph, normal)),
     )?;
-    let result = texture(graph, "ssr.reflection", depth, Format::Rgba32Float);
+    let result = texture(graph, "ssr.reflection", depth, settings.storage.format());
     let pass = graph
         .compute("ssr/march")
         .read("depth", depth)
         .read("normal", normal)
-        .write("result", result);
+        .write("result", result)
+        .feature("half", settings.storage == HitStorage::Half);
+    let refinements = match settings.search {
+        Search::Linear => 0,
+        Search::Refined => settings.steps,
+    };
     Ok(camera
         .set(pass)
         .set("max_distance", settings.max_distance)
         .set("thickness", settings.thickness)
         .set("stride", 1.0 / settings.resolution)
         .set("max_steps", settings.march_limit)
-        .set("refinements", settings.steps)
+        .set("refinements", refinements)
         .set("camera_fade", settings.camera_fade)
         .set("depth_fade", settings.depth_fade)
         .set("distance_fade", settings.distance_fade)

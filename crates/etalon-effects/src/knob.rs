@@ -11,6 +11,7 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::SettingError;
+use crate::quality::{Quality, preset};
 
 /// What a knob is set to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -184,6 +185,13 @@ pub trait Tunable: Clone + Default + 'static {
 
     /// One for each field that is a single value.
     fn knobs() -> &'static [Knob<Self>];
+
+    /// The settings of a preset: of accuracy, with the default look.
+    #[must_use]
+    fn preset(quality: Quality) -> Self {
+        // A test holds every preset to its effect's table.
+        tuned(preset(Self::EFFECT, quality)).unwrap_or_default()
+    }
 
     /// The knob of a name.
     ///

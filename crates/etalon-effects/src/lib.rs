@@ -32,6 +32,7 @@
 #![forbid(unsafe_code)]
 
 pub mod bloom;
+pub mod budget;
 pub mod chain;
 mod check;
 pub mod composite;
@@ -42,11 +43,13 @@ pub mod forward;
 pub mod geometry;
 pub mod knob;
 pub mod lighting;
+pub mod quality;
 pub mod registry;
 mod scene;
 pub mod ssr;
 
 pub use chain::{Chain, ChainSettings, chain};
 pub use error::{EffectError, SettingError};
+pub use quality::Quality;
 pub use registry::{EffectEntry, effect, effects};
 pub use scene::{CameraParams, DepthRange, SceneInputs};

@@ -5,7 +5,7 @@ mod common;
 use common::{Run, hash, image, texels};
 use etalon_core::Format;
 use etalon_core::image::ImageData;
-use etalon_effects::bloom::{Bloom, bloom};
+use etalon_effects::bloom::{Bloom, LightStorage, bloom};
 use etalon_effects::exposure::Exposed;
 
 /// Nothing but the filters: no threshold, no weights.
@@ -16,6 +16,7 @@ const PLAIN: Bloom = Bloom {
     levels: 4,
     scatter: 0.5,
     intensity: 1.0,
+    storage: LightStorage::Half,
 };
 
 fn bloomed(colour: &ImageData, factor: f32, settings: &Bloom) -> ImageData {

@@ -335,3 +335,32 @@ fn a_poisoned_history_is_forgotten_in_one_frame() {
         }
     }
 }
+
+/// Of each square of texels one counts: a picture that is one thing there and
+/// another elsewhere measures that thing.
+#[test]
+fn a_stride_looks_at_the_middle_of_each_square() {
+    for (width, height, stride) in [(64, 48, 2), (61, 47, 4), (7, 5, 3), (33, 1, 32), (3, 3, 64)] {
+        let middle = |at: u32, side: u32| at == (at / stride * stride + stride / 2).min(side - 1);
+        let colour = image(Format::Rgba16Float, width, height, |x, y| {
+            let seen = middle(x, width) && middle(y, height);
+            [if seen { 2.0 } else { 1000.0 }; 4]
+        });
+        let mut run = Run::new();
+        let source = run.import("colour", &colour);
+        let settings = Exposure {
+            metering: Metering::Arithmetic,
+            stride,
+            ..Exposure::default()
+        };
+        let sum = measure(&mut run.graph, source, &settings).expect("valid");
+        let [sum, weight, ..] = texels(&run.output(sum))[0];
+        let squares = width.div_ceil(stride) * height.div_ceil(stride);
+        assert_eq!(weight, squares as f32, "{width}×{height} / {stride}");
+        // Luminance weights sum to 1 within a rounding of each.
+        assert!(
+            (sum / weight - 2.0).abs() < 1e-6,
+            "{width}×{height} / {stride}: {sum}"
+        );
+    }
+}

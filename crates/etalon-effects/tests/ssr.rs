@@ -2,29 +2,14 @@
 
 mod common;
 
-use common::{Run, image, texels};
+use common::{PLAIN_SSR as PLAIN, Run, image, texels};
 use etalon_core::Format;
 use etalon_core::image::ImageData;
-use etalon_effects::ssr::{Blend, Ssr, march};
+use etalon_effects::ssr::{Ssr, march};
 use etalon_effects::{CameraParams, DepthRange};
 use etalon_scenes::trace::MirrorRay;
 use etalon_scenes::{Frame, FrameSize, World, scene};
 use glam::Vec2;
-
-/// No fade: visibility is 1 where there is a hit.
-const PLAIN: Ssr = Ssr {
-    max_distance: 50.0,
-    resolution: 1.0,
-    steps: 8,
-    thickness: 0.25,
-    march_limit: 4096,
-    camera_fade: 0.0,
-    depth_fade: 0.0,
-    distance_fade: 0.0,
-    border: 0.0,
-    blur_radius: 0,
-    blend: Blend::Add,
-};
 
 fn camera_of(frame: &Frame) -> CameraParams {
     CameraParams {

@@ -14,21 +14,27 @@ impl Frame {
     /// # Errors
     /// If the graph has imports of these names already.
     pub fn import(&self, graph: &mut Graph, delta_time: f32) -> Result<SceneInputs, GraphError> {
-        let projection = self.camera.projection;
         Ok(SceneInputs {
             colour: graph.import_texture("colour", self.colour.desc)?,
             depth: graph.import_texture("depth", self.depth.desc)?,
             normal: graph.import_texture("normal", self.normal.desc)?,
             specular: graph.import_texture("specular", self.specular.desc)?,
             velocity: Some(graph.import_texture("velocity", self.velocity.desc)?),
-            camera: CameraParams {
-                scale: projection.scale().as_vec2(),
-                centre: Vec2::ZERO,
-                near: projection.near() as f32,
-                depth: DepthRange::ReversedInfinite,
-            },
+            camera: self.camera_params(),
             delta_time,
         })
+    }
+
+    /// The frame's projection as effects take it.
+    #[must_use]
+    pub fn camera_params(&self) -> CameraParams {
+        let projection = self.camera.projection;
+        CameraParams {
+            scale: projection.scale().as_vec2(),
+            centre: Vec2::ZERO,
+            near: projection.near() as f32,
+            depth: DepthRange::ReversedInfinite,
+        }
     }
 
     /// The frame's images under the names that [`import`](Self::import) uses.

@@ -233,6 +233,7 @@ impl Backend for CpuBackend {
             max_workgroup_invocations: 1024,
             max_workgroup_bytes: 1 << 16,
             uniform_alignment: 16,
+            extended_storage_formats: true,
             ..Limits::default()
         }
     }

@@ -42,6 +42,10 @@ choices!(Metering {
 pub struct Exposure {
     /// Which average is metered. The geometric one costs a logarithm per pixel.
     pub metering: Metering,
+    /// Distance between the texels that are looked at, in each axis, in `[1, 64]`:
+    /// 2 looks at a quarter of the picture for a quarter of the cost, and lets
+    /// small lights jump in and out of the average.
+    pub stride: u32,
     /// Luminance that the average is brought to, in `[1e-4, 10]`: 0.18 is the
     /// middle grey of photography.
     pub key: f32,
@@ -62,6 +66,7 @@ pub struct Exposure {
 
 knobs!(Exposure, "exposure" {
     choice metering [Metering] "", Look ["arithmetic", "logarithmic"], "which average is metered";
+    count stride [1, 64] "texels", Accuracy [32, 16, 8, 4, 2, 1], "distance between the texels looked at";
     real key [1e-4, 10.0] "luminance", Look [0.09, 0.18, 0.36], "what the average is brought to";
     real compensation [-16.0, 16.0] "stops", Look [-1.0, 0.0, 1.0], "brighter or darker than that";
     real min_luminance [1e-6, 65_504.0] "luminance", Look [1e-4, 1e-3, 1e-2], "darkest luminance adapted to";
@@ -74,6 +79,7 @@ impl Default for Exposure {
     fn default() -> Self {
         Self {
             metering: Metering::Logarithmic,
+            stride: 1,
             key: 0.18,
             compensation: 0.0,
             min_luminance: 1e-3,
@@ -117,7 +123,7 @@ const TILE: u32 = 16;
 /// `settings.metering` says.
 ///
 /// The result is one texel of `rgba32float`: the sum, and the number of texels
-/// that were finite and so took part.
+/// that were looked at, finite, and so took part.
 ///
 /// # Errors
 /// If a setting is out of range.
@@ -128,7 +134,10 @@ pub fn measure(
 ) -> Result<Texture, EffectError> {
     settings.validate()?;
     let extent = graph.desc(colour).extent;
-    let mut size = [extent.width, extent.height].map(|side| side.div_ceil(TILE).max(1));
+    let mut size = [extent.width, extent.height].map(|side| {
+        let seen = side.div_ceil(settings.stride);
+        seen.div_ceil(TILE).max(1)
+    });
     let mut level = 0;
     let mut tiles = |graph: &mut Graph, [width, height]: [u32; 2]| {
         level += 1;
@@ -143,6 +152,7 @@ pub fn measure(
         .read("source", colour)
         .write("result", result)
         .constant("METERING", settings.metering())
+        .constant("STRIDE", f64::from(settings.stride))
         .set("floor_luminance", settings.min_luminance)
         .groups([size[0], size[1], 1])?
         .texture("result")?;

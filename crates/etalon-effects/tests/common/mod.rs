@@ -12,7 +12,25 @@ use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanOptions};
 use etalon_core::resource::TextureDesc;
 use etalon_effects::SceneInputs;
+use etalon_effects::ssr::{Blend, HitStorage, Search, Ssr};
 use etalon_scenes::Frame;
+
+/// Reflections without fades and blur: visibility is 1 where there is a hit.
+pub(crate) const PLAIN_SSR: Ssr = Ssr {
+    max_distance: 50.0,
+    resolution: 1.0,
+    search: Search::Refined,
+    steps: 8,
+    thickness: 0.25,
+    march_limit: 4096,
+    camera_fade: 0.0,
+    depth_fade: 0.0,
+    distance_fade: 0.0,
+    border: 0.0,
+    blur_radius: 0,
+    storage: HitStorage::Full,
+    blend: Blend::Add,
+};
 
 /// The executor of these tests.
 pub(crate) fn backend() -> Box<dyn Backend> {

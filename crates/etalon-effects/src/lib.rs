@@ -45,6 +45,7 @@ pub mod lighting;
 pub mod registry;
 mod scene;
 pub mod ssr;
+pub mod truth;
 
 pub use chain::{Chain, ChainSettings, chain};
 pub use error::{EffectError, SettingError};

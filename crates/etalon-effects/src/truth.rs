@@ -314,3 +314,66 @@ pub(crate) fn not_negative(
     }
     .into())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_is_made_finite_as_documented() {
+        let cases = [
+            (f64::NAN, 0.0, 0.0),
+            (-f64::NAN, 0.0, 0.0),
+            (f64::INFINITY, MOST_LIGHT, 1.0),
+            (f64::NEG_INFINITY, 0.0, 0.0),
+            (-1e-300, 0.0, 0.0),
+            (0.25, 0.25, 0.25),
+            (1.5, 1.5, 1.0),
+            (65_504.5, MOST_LIGHT, 1.0),
+        ];
+        for (value, as_light, as_share) in cases {
+            assert_eq!(radiance(value), as_light, "{value}");
+            assert_eq!(unit_interval(value), as_share, "{value}");
+            let plane = Plane::new(1, 1, vec![[value; 4]]).expect("one texel");
+            let expected = [as_light, as_light, as_light, as_share];
+            assert_eq!(plane.sanitised().texels(), [expected]);
+        }
+    }
+
+    #[test]
+    fn places_are_between_texel_centres() {
+        let plane = Plane::from_fn(3, 2, |x, y| [f64::from(x), f64::from(y), 0.0, 1.0]);
+        let plane = plane.expect("small");
+        for (place, expected) in [
+            ((0.5, 0.5), (0.0, 0.0)),
+            ((1.0, 1.0), (0.5, 0.5)),
+            ((2.25, 0.75), (1.75, 0.25)),
+            ((0.0, 2.0), (0.0, 1.0)),
+            ((1e300, -1e300), (2.0, 0.0)),
+        ] {
+            let got = plane.bilinear(DVec2::from(place));
+            assert_eq!(
+                got,
+                DVec4::new(expected.0, expected.1, 0.0, 1.0),
+                "{place:?}"
+            );
+        }
+        assert_eq!(plane.at(i64::MIN, i64::MAX), [0.0, 1.0, 0.0, 1.0]);
+        assert_eq!(plane.at(9, 0), [2.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn eight_bits_are_exact_shares() {
+        let texels: Vec<[f32; 4]> = (0..256).map(|code| [code as f32 / 255.0; 4]).collect();
+        let desc = TextureDesc::d2(16, 16, Format::Rgba8Unorm);
+        let image = ImageData::from_rgba_f32(desc, &texels).expect("small");
+        for (code, texel) in Plane::of(&image)
+            .expect("small")
+            .texels()
+            .iter()
+            .enumerate()
+        {
+            assert_eq!(*texel, [code as f64 / 255.0; 4]);
+        }
+    }
+}

@@ -47,6 +47,7 @@ pub mod quality;
 pub mod registry;
 mod scene;
 pub mod ssr;
+pub mod truth;
 
 pub use chain::{Chain, ChainSettings, chain};
 pub use error::{EffectError, SettingError};

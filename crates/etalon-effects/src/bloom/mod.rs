@@ -10,6 +10,8 @@
 //! Warfare", SIGGRAPH 2014: the 13-tap filter down and the 3 × 3 tent up.
 //! B. Karis, "Tone mapping", 2013: the weighting against flicker.
 
+pub mod truth;
+
 use etalon_core::Format;
 use etalon_core::graph::{ComputePass, Graph, Texture};
 use etalon_core::resource::{AddressMode, Filter, SamplerDesc};

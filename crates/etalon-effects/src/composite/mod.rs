@@ -1,5 +1,7 @@
 //! The last pass: exposure, bloom, tone curve and encoding in one kernel.
 
+pub mod truth;
+
 use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
 use etalon_core::resource::TextureDesc;

@@ -12,6 +12,8 @@
 //! [`composite`]: crate::composite
 //! [`bloom`]: crate::bloom
 
+pub mod truth;
+
 use etalon_core::Format;
 use etalon_core::graph::{ClearValue, Graph, Texture};
 use etalon_core::resource::TextureDesc;

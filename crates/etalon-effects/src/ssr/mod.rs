@@ -16,6 +16,8 @@
 //! reciprocal, an axis the ray does not cross is never divided by, and
 //! refinement keeps a bracket of one miss and one hit.
 
+pub mod truth;
+
 use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
 use etalon_core::resource::TextureDesc;

@@ -6,10 +6,13 @@
 //!
 //! * [`model`]: what a sweep found, as data;
 //! * [`metric`]: measures of error;
-//! * [`front`]: what costs least for its error.
+//! * [`front`]: what costs least for its error;
+//! * [`chart`]: error against time, drawn.
 
 #![forbid(unsafe_code)]
 
+pub mod chart;
 pub mod front;
 pub mod metric;
 pub mod model;
+mod text;

@@ -4,8 +4,15 @@
 //! against independent truths, the time on every backend and the work in counters
 //! that depend on no hardware are kept, and drawn as charts to decide from.
 //!
-//! * [`model`]: what a sweep found, as data.
+//! * [`model`]: what a sweep found, as data;
+//! * [`metric`]: measures of error;
+//! * [`front`]: what costs least for its error;
+//! * [`chart`]: error against time, drawn.
 
 #![forbid(unsafe_code)]
 
+pub mod chart;
+pub mod front;
+pub mod metric;
 pub mod model;
+mod text;

@@ -1,5 +1,6 @@
-//! Perceived difference, by the FLIP metric of Andersson et al. (2020).
+//! Perceived difference of images, by the FLIP metric of their pictures.
 
+use etalon_accuracy::metric::flip::{SMALLEST, ldr};
 use etalon_core::format::SampleKind;
 use etalon_core::image::ImageData;
 use serde::Serialize;
@@ -28,10 +29,6 @@ impl Flip {
     }
 }
 
-/// Smallest width and height the metric is computed for: its filters span
-/// several pixels, and a picture smaller than them shows an eye nothing.
-const SMALLEST: u32 = 8;
-
 /// The mean FLIP error between the pictures of two images of one description,
 /// tone-mapped alike and seen as 8-bit sRGB.
 #[must_use]
@@ -54,13 +51,8 @@ pub fn flip(reference: &ImageData, subject: &ImageData) -> Flip {
     if (a.width, a.height) != (b.width, b.height) {
         return Flip::Skipped("different sizes");
     }
-    if a.rgb == b.rgb {
-        return Flip::Mean(0.0);
-    }
-    let reference = nv_flip::FlipImageRgb8::with_data(a.width, a.height, &a.rgb);
-    let subject = nv_flip::FlipImageRgb8::with_data(b.width, b.height, &b.rgb);
-    let errors = nv_flip::flip(reference, subject, nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec();
-    // Summed here: the library's own mean is one of a histogram.
-    let sum: f64 = errors.iter().map(|&error| f64::from(error)).sum();
-    Flip::Mean((sum / errors.len().max(1) as f64) as f32)
+    // The sizes were looked at above, so only one too large is left to refuse.
+    ldr(&b.rgb, &a.rgb, [a.width, a.height]).map_or(Flip::Skipped("too large"), |map| {
+        Flip::Mean(map.mean() as f32)
+    })
 }

@@ -117,7 +117,7 @@ fn path() -> PathBuf {
 /// # Errors
 /// If nothing can be counted.
 pub fn run(options: &Options) -> Result<bool, CountError> {
-    let program = measure::build()?;
+    let program = measure::build(measure::INTERPRETER)?;
     let instructions = count(&program)?;
     let path = path();
     let file = |source| CountError::File {

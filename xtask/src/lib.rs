@@ -34,6 +34,9 @@ enum Task {
     /// Every kernel on the interpreter and on a Vulkan driver, side by side;
     /// `--help` after it says more.
     BenchKernels(measure::Forwarded),
+    /// What accuracy costs in time: every setting's errors beside its time on
+    /// every backend; `--help` after it says more.
+    Accuracy(measure::Forwarded),
     /// Look whether the interpreter's handlers use vector instructions.
     CheckVectors(vectors::Options),
     /// Count the instructions the interpreter executes for each kernel.
@@ -65,9 +68,13 @@ pub fn main() -> ExitCode {
         Task::TestPrograms(options) => conclude(this_program().and_then(|program| {
             test_programs::run(&options, &program).map_err(|error| error.to_string())
         })),
-        Task::BenchKernels(arguments) => {
-            conclude(measure::run("kernels", &arguments).map_err(|error| error.to_string()))
-        }
+        Task::BenchKernels(arguments) => conclude(
+            measure::run(measure::INTERPRETER, &["kernels"], &arguments)
+                .map_err(|error| error.to_string()),
+        ),
+        Task::Accuracy(arguments) => conclude(
+            measure::run(measure::ACCURACY, &[], &arguments).map_err(|error| error.to_string()),
+        ),
         Task::CheckVectors(options) => {
             conclude(vectors::run(&options).map_err(|error| error.to_string()))
         }

@@ -1,5 +1,6 @@
 //! Tasks that measure. What is measured has to be built as it is released, so
-//! a program of its own does it, the package `etalon-measure`.
+//! programs of their own do it, the packages `etalon-measure` and
+//! `etalon-accuracy`.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -38,27 +39,33 @@ fn cargo() -> Command {
     Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Builds the measuring program in release profile and runs one of its tasks.
-/// Returns whether it succeeded; it has said itself what went wrong.
+/// The program that measures the interpreter.
+pub const INTERPRETER: &str = "etalon-measure";
+/// The program that measures what accuracy costs in time.
+pub const ACCURACY: &str = "etalon-accuracy";
+
+/// Builds a measuring program in release profile and runs it with `first`
+/// arguments and those forwarded. Returns whether it succeeded; it has said itself
+/// what went wrong.
 ///
 /// # Errors
 /// If it cannot be built or started.
-pub fn run(task: &str, forwarded: &Forwarded) -> Result<bool, MeasureError> {
-    let status = Command::new(build()?)
-        .arg(task)
+pub fn run(program: &str, first: &[&str], forwarded: &Forwarded) -> Result<bool, MeasureError> {
+    let status = Command::new(build(program)?)
+        .args(first)
         .args(&forwarded.arguments)
         .status()
         .map_err(MeasureError::Start)?;
     Ok(status.success())
 }
 
-/// Builds the measuring program in release profile and says where it is.
+/// Builds a measuring program in release profile and says where it is.
 ///
 /// # Errors
 /// If it cannot be built.
-pub fn build() -> Result<PathBuf, MeasureError> {
+pub fn build(program: &str) -> Result<PathBuf, MeasureError> {
     let output = cargo()
-        .args(["build", "--release", "--package", "etalon-measure"])
+        .args(["build", "--release", "--package", program])
         .args(["--message-format", "json-render-diagnostics"])
         .stderr(Stdio::inherit())
         .output()

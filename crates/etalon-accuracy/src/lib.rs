@@ -4,15 +4,34 @@
 //! against independent truths, the time on every backend and the work in counters
 //! that depend on no hardware are kept, and drawn as charts to decide from.
 //!
-//! * [`model`]: what a sweep found, as data;
+//! * [`sweep`](mod@sweep): trying settings, errors first, then times in turns;
+//! * [`ladder`]: which settings are tried;
+//! * [`stage`]: a scene as effects and truths take it;
+//! * [`executors`], [`observe`], [`work`]: running a setting, seeing what it wrote,
+//!   counting what it did;
+//! * [`judge`](mod@judge): which truths an effect is held to, and by what measure;
 //! * [`metric`]: measures of error;
-//! * [`front`]: what costs least for its error;
-//! * [`chart`]: error against time, drawn.
+//! * [`model`], [`store`], [`pictures`]: what a sweep found, as data and in files;
+//! * [`front`](mod@front): what costs least for its error;
+//! * [`chart`]: error against time, drawn;
+//! * [`table`](mod@table), [`profile`](mod@profile): the fronts for a terminal, and
+//!   for settings that fit a budget.
 
 #![forbid(unsafe_code)]
 
 pub mod chart;
+pub mod executors;
 pub mod front;
+pub mod judge;
+pub mod ladder;
 pub mod metric;
 pub mod model;
+pub mod observe;
+pub mod pictures;
+pub mod profile;
+pub mod stage;
+pub mod store;
+pub mod sweep;
+pub mod table;
 mod text;
+pub mod work;

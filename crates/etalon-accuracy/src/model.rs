@@ -48,6 +48,20 @@ pub struct Subject {
     pub points: Vec<Point>,
 }
 
+impl Subject {
+    /// The main metric of each kind of error: the first there is.
+    #[must_use]
+    pub fn mains(&self) -> Vec<&Metric> {
+        let mut mains: Vec<&Metric> = Vec::new();
+        for metric in &self.metrics {
+            if !mains.iter().any(|known| known.kind == metric.kind) {
+                mains.push(metric);
+            }
+        }
+        mains
+    }
+}
+
 /// A knob that was turned.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Knob {
@@ -109,6 +123,8 @@ pub struct Fact {
 pub struct Point {
     /// Unique within the subject, of letters that file names may have.
     pub id: String,
+    /// Equal for points that plan to the very same work: kernels, settings, sizes.
+    pub fingerprint: String,
     /// By knob, every one that was turned: as it was set here.
     pub settings: BTreeMap<String, String>,
     /// `strict` or `fast`.
@@ -121,6 +137,28 @@ pub struct Point {
     pub work: Work,
     /// One for each executor that ran it.
     pub results: Vec<Outcome>,
+}
+
+impl Point {
+    /// How an executor did.
+    #[must_use]
+    pub fn on(&self, executor: &str) -> Option<&Outcome> {
+        self.results
+            .iter()
+            .find(|result| result.executor == executor)
+    }
+
+    /// The median time of an executor, in nanoseconds, if it was measured.
+    #[must_use]
+    pub fn time_on(&self, executor: &str) -> Option<f64> {
+        Some(self.on(executor)?.time?.median)
+    }
+
+    /// An error on an executor, by metric id, if it could be had.
+    #[must_use]
+    pub fn error_on(&self, executor: &str, metric: &str) -> Option<f64> {
+        self.on(executor)?.errors.get(metric).copied()
+    }
 }
 
 /// Work that depends on no hardware, of one frame.

@@ -1,0 +1,171 @@
+//! Measures what accuracy costs in time: see the library, and `--help`.
+
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+use clap::Parser;
+use etalon_accuracy::executors::Kind;
+use etalon_accuracy::model::Sweep;
+use etalon_accuracy::pictures::Pictures;
+use etalon_accuracy::sweep::{Options, Progress, sweep};
+use etalon_accuracy::{profile, store, table};
+use etalon_effects::{EffectEntry, effect, effects};
+use etalon_scenes::FrameSize;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Sweeps the settings of effects: their errors against independent truths beside
+/// their times on every backend.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Effects; all that have a truth without it.
+    #[arg(long, value_delimiter = ',')]
+    effect: Vec<String>,
+    /// Scenes; for each effect those it is best judged on without it.
+    #[arg(long, value_delimiter = ',')]
+    scene: Vec<String>,
+    /// Backends.
+    #[arg(long, value_delimiter = ',', default_value = "cpu,wgpu,ash")]
+    backend: Vec<Kind>,
+    /// Pixels of the pictures.
+    #[arg(long, default_value = "640x360")]
+    size: String,
+    /// Minutes for everything; what does not fit is left out and said so.
+    #[arg(long, default_value_t = 10.0)]
+    budget_minutes: f64,
+    /// How many knobs are turned at once.
+    #[arg(long, default_value_t = 2)]
+    depth: usize,
+    /// Frames that each setting is timed for on each backend.
+    #[arg(long, default_value_t = 9)]
+    frames: u32,
+    /// Write a page with charts and pictures here. What is there of an earlier run
+    /// is gone on with.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Write everything found to this file.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Write the fronts of the last backend to this file, as
+    /// `ChainSettings::for_budget` takes them.
+    #[arg(long)]
+    profile: Option<PathBuf>,
+}
+
+impl Arguments {
+    fn effects(&self) -> Result<Vec<&'static EffectEntry>, String> {
+        let judged = || effects().iter().filter(|effect| effect.name != "chain");
+        if self.effect.is_empty() {
+            return Ok(judged().collect());
+        }
+        let known = |name: &String| {
+            effect(name)
+                .filter(|effect| effect.name != "chain")
+                .ok_or_else(|| {
+                    let names: Vec<_> = judged().map(|effect| effect.name).collect();
+                    format!(
+                        "there is no effect `{name}` to judge; there are {}",
+                        names.join(", ")
+                    )
+                })
+        };
+        self.effect.iter().map(known).collect()
+    }
+
+    fn options(&self) -> Result<Options, String> {
+        let size = self
+            .size
+            .split_once(['x', '×'])
+            .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+        let (width, height) =
+            size.ok_or_else(|| format!("`{}` is no size like 640x360", self.size))?;
+        let minutes = self.budget_minutes;
+        let budget = Duration::try_from_secs_f64(minutes * 60.0)
+            .map_err(|_| format!("{minutes} minutes are no time that can be waited"))?;
+        Ok(Options {
+            effects: self.effects()?,
+            scenes: self.scene.clone(),
+            backends: self.backend.clone(),
+            size: FrameSize::new(width, height).map_err(|error| error.to_string())?,
+            depth: self.depth.min(8),
+            frames: self.frames.max(3),
+            budget,
+        })
+    }
+
+    fn run(&self) -> Result<(), String> {
+        let options = self.options()?;
+        let pictures = self
+            .report
+            .as_deref()
+            .map_or_else(Pictures::none, Pictures::beside);
+        let before = match self.report.as_deref() {
+            Some(folder) => store::read(folder).map_err(|error| error.to_string())?,
+            None => None,
+        };
+        let mut shown = Shown {
+            bar: ProgressBar::hidden(),
+            folder: self.report.as_deref(),
+        };
+        let found = sweep(&options, before.as_ref(), &pictures, &mut shown);
+        shown.bar.finish_and_clear();
+        let found = found.map_err(|error| error.to_string())?;
+        print!("{}", table::text(&found));
+        if let Some(path) = &self.json {
+            let text = serde_json::to_string_pretty(&found).map_err(|error| error.to_string())?;
+            write(path, &text)?;
+        }
+        if let (Some(path), Some(executor)) = (&self.profile, found.executors.last()) {
+            let profile = profile::profile(&found, executor);
+            let text = serde_json::to_string_pretty(&profile).map_err(|error| error.to_string())?;
+            write(path, &text)?;
+        }
+        if let Some(folder) = &self.report {
+            store::keep(&found, folder).map_err(|error| error.to_string())?;
+        }
+        Ok(())
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    std::fs::write(path, text).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Progress as a bar with an estimate, and what was found kept in a folder.
+struct Shown<'a> {
+    bar: ProgressBar,
+    folder: Option<&'a Path>,
+}
+
+impl Progress for Shown<'_> {
+    fn begin(&mut self, what: &str, steps: usize) {
+        self.bar.finish_and_clear();
+        // The template is a constant that is right.
+        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        self.bar = ProgressBar::new(steps as u64).with_style(style);
+        self.bar.set_message(what.to_owned());
+    }
+
+    fn step(&mut self) {
+        self.bar.inc(1);
+    }
+
+    fn keep(&mut self, sweep: &Sweep) -> Result<(), String> {
+        self.folder
+            .map_or(Ok(()), |folder| store::keep(sweep, folder))
+            .map_err(|error| error.to_string())
+    }
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! What a sweep found, in a file that a later run goes on with.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use thiserror::Error;
+
+use crate::model::Sweep;
+
+/// The file's name, beside the report.
+pub const FILE: &str = "sweep.json";
+
+/// Why a sweep cannot be kept or read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// The file cannot be written or read.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The file is not what this program writes.
+    #[error("{} is no sweep that this program kept: {source}; move it away to begin anew", path.display())]
+    Content {
+        /// Which.
+        path: PathBuf,
+        /// Why not.
+        source: serde_json::Error,
+    },
+}
+
+/// Keeps a sweep in a folder, which is made if it is not there. Whoever stops the
+/// program while it writes finds the file as it was before.
+///
+/// # Errors
+/// If the folder or the file cannot be written.
+pub fn keep(sweep: &Sweep, folder: &Path) -> Result<(), StoreError> {
+    let path = folder.join(FILE);
+    let file = |source| StoreError::File {
+        path: path.clone(),
+        source,
+    };
+    let text = serde_json::to_string_pretty(sweep).map_err(|error| file(error.into()))?;
+    std::fs::create_dir_all(folder).map_err(file)?;
+    let new = folder.join("sweep.json.new");
+    std::fs::write(&new, text).map_err(file)?;
+    std::fs::rename(&new, &path).map_err(file)
+}
+
+/// The sweep kept in a folder, if one is.
+///
+/// # Errors
+/// If the file cannot be read, or is something else.
+pub fn read(folder: &Path) -> Result<Option<Sweep>, StoreError> {
+    let path = folder.join(FILE);
+    match std::fs::read(&path) {
+        Ok(bytes) => serde_json::from_slice(&bytes)
+            .map(Some)
+            .map_err(|source| StoreError::Content { path, source }),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(StoreError::File { path, source }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_kept_is_read_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("new");
+        assert_eq!(read(&below).unwrap(), None);
+        let mut sweep = Sweep {
+            size: [640, 360],
+            ..Sweep::default()
+        };
+        for note in ["one", "another"] {
+            sweep.notes.push(note.to_owned());
+            keep(&sweep, &below).unwrap();
+            assert_eq!(read(&below).unwrap(), Some(sweep.clone()));
+        }
+        std::fs::write(below.join(FILE), "{").unwrap();
+        let error = read(&below).unwrap_err();
+        assert!(matches!(error, StoreError::Content { .. }), "{error}");
+        assert!(matches!(
+            keep(&sweep, &below.join(FILE)),
+            Err(StoreError::File { .. })
+        ));
+    }
+}

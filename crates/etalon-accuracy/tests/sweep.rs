@@ -1,0 +1,307 @@
+//! Sweeps on the interpreter: the same each time, gone on with where they stopped,
+//! and with what theory says.
+
+use std::time::Duration;
+
+use etalon_accuracy::executors::Kind;
+use etalon_accuracy::model::{Point, Subject, Sweep};
+use etalon_accuracy::pictures::Pictures;
+use etalon_accuracy::store;
+use etalon_accuracy::sweep::{Options, Progress, SweepError, sweep};
+use etalon_effects::{effect, effects};
+use etalon_scenes::FrameSize;
+
+/// Keeps nothing; stops after a number of steps, as a user might.
+#[derive(Default)]
+struct Quiet {
+    kept: Vec<Sweep>,
+    stop_after: Option<usize>,
+}
+
+impl Progress for Quiet {
+    fn begin(&mut self, _: &str, _: usize) {}
+
+    fn step(&mut self) {}
+
+    fn keep(&mut self, sweep: &Sweep) -> Result<(), String> {
+        self.kept.push(sweep.clone());
+        match self.stop_after {
+            Some(count) if self.kept.len() >= count => Err("stopped".to_owned()),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn options(name: &str, depth: usize) -> Options {
+    Options {
+        effects: vec![effect(name).unwrap()],
+        scenes: Vec::new(),
+        backends: vec![Kind::Cpu],
+        size: FrameSize::new(160, 90).unwrap(),
+        depth,
+        frames: 3,
+        budget: Duration::from_secs(3600),
+    }
+}
+
+fn run(options: &Options) -> Sweep {
+    sweep(options, None, &Pictures::none(), &mut Quiet::default()).unwrap()
+}
+
+/// All that no clock decides.
+fn timeless(mut sweep: Sweep) -> Sweep {
+    for subject in &mut sweep.subjects {
+        for point in &mut subject.points {
+            for result in &mut point.results {
+                result.time = None;
+            }
+        }
+    }
+    sweep
+}
+
+fn at<'a>(subject: &'a Subject, settings: &[(&str, &str)]) -> &'a Point {
+    let same = |point: &&Point| {
+        point.arithmetic == "strict"
+            && subject.knobs.iter().all(|knob| {
+                let set = settings.iter().find(|(name, _)| *name == knob.name);
+                point.settings[&knob.name] == set.map_or(knob.default.as_str(), |(_, value)| value)
+            })
+    };
+    let found = subject.points.iter().find(same);
+    found.unwrap_or_else(|| panic!("no point with {settings:?}"))
+}
+
+fn error(point: &Point, metric: &str) -> f64 {
+    point
+        .error_on("cpu", metric)
+        .unwrap_or_else(|| panic!("{} has no {metric}", point.id))
+}
+
+#[test]
+fn two_sweeps_find_the_same_but_for_times() {
+    for effect in ["bloom", "exposure", "composite"] {
+        let options = options(effect, 1);
+        let first = run(&options);
+        for subject in &first.subjects {
+            assert!(subject.points.len() >= 2, "{effect}");
+            for point in &subject.points {
+                let time = point.on("cpu").unwrap().time.unwrap();
+                assert!(time.frames >= 3 && time.median > 0.0, "{effect} {time:?}");
+                assert!(time.lower <= time.median && time.median <= time.upper);
+                assert!(point.work.texel_fetches > 0 && point.work.operations > 0);
+                for metric in &subject.metrics {
+                    let error = point.error_on("cpu", &metric.id);
+                    assert!(error.is_some_and(f64::is_finite), "{effect} {}", metric.id);
+                }
+            }
+        }
+        assert_eq!(timeless(first), timeless(run(&options)), "{effect}");
+    }
+}
+
+#[test]
+fn a_stopped_sweep_is_gone_on_with() {
+    let folder = tempfile::tempdir().unwrap();
+    let options = options("bloom", 1);
+    let pictures = Pictures::beside(folder.path());
+    let mut stopped = Quiet {
+        stop_after: Some(1),
+        ..Quiet::default()
+    };
+    let error = sweep(&options, None, &pictures, &mut stopped).unwrap_err();
+    assert!(matches!(error, SweepError::Keep(_)), "{error}");
+    let mut before = stopped.kept.pop().unwrap();
+    store::keep(&before, folder.path()).unwrap();
+    assert_eq!(store::read(folder.path()).unwrap(), Some(before.clone()));
+    // What it says it knows is believed, so that what is measured anew shows.
+    let known = before.subjects[0].points.len();
+    assert!(known > 0);
+    for point in &mut before.subjects[0].points {
+        point.bytes = 12_345;
+    }
+    let mut quiet = Quiet::default();
+    let found = sweep(&options, Some(&before), &pictures, &mut quiet).unwrap();
+    let kept = found.subjects[0]
+        .points
+        .iter()
+        .filter(|point| point.bytes == 12_345);
+    assert_eq!(kept.count(), known);
+    assert_eq!(found.subjects.len(), 2);
+    // Without its picture a point is not known.
+    let lost = before.subjects[0].points[0]
+        .on("cpu")
+        .unwrap()
+        .picture
+        .clone()
+        .unwrap();
+    std::fs::remove_file(folder.path().join(&lost)).unwrap();
+    let found = sweep(&options, Some(&before), &pictures, &mut quiet).unwrap();
+    assert_ne!(found.subjects[0].points[0].bytes, 12_345);
+    assert!(folder.path().join(lost).is_file());
+    // Another size has nothing in common.
+    let other = Options {
+        size: FrameSize::new(96, 54).unwrap(),
+        ..options
+    };
+    let found = sweep(&other, Some(&before), &Pictures::none(), &mut quiet).unwrap();
+    assert!(
+        found.subjects[0]
+            .points
+            .iter()
+            .all(|point| point.bytes != 12_345)
+    );
+}
+
+#[test]
+fn no_time_leaves_the_most_turned_out_and_says_so() {
+    let hurried = Options {
+        budget: Duration::ZERO,
+        ..options("bloom", 2)
+    };
+    let found = run(&hurried);
+    for subject in &found.subjects {
+        assert_eq!(subject.points.len(), 2);
+        assert_eq!(subject.points[0].id, "strict");
+        assert!(
+            subject
+                .points
+                .iter()
+                .all(|point| point.time_on("cpu").is_some())
+        );
+    }
+    let left_out = |note: &&String| note.contains("left out for want of time");
+    assert_eq!(
+        found.notes.iter().filter(left_out).count(),
+        2,
+        "{:?}",
+        found.notes
+    );
+}
+
+#[test]
+fn what_is_not_there_is_said() {
+    let scene = Options {
+        scenes: vec!["nowhere".to_owned()],
+        ..options("ssr", 0)
+    };
+    let error = sweep(&scene, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
+    assert!(error.to_string().contains("wet-floor"), "{error}");
+    let chain = options("chain", 0);
+    let chain = Options {
+        scenes: vec!["wet-floor".to_owned()],
+        ..chain
+    };
+    let error = sweep(&chain, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
+    assert!(
+        error.to_string().contains("no truth for `chain`"),
+        "{error}"
+    );
+}
+
+/// More texels looked at and more halvings bring the hit nearer to the first
+/// crossing, and cost look-ups.
+#[test]
+fn reflections_come_nearer_as_resolution_and_steps_rise() {
+    let found = run(&options("ssr", 2));
+    for subject in &found.subjects {
+        let ladder = ["0.0625", "0.125", "0.25", "0.5", "1"];
+        let mut before: Option<&Point> = None;
+        for resolution in ladder {
+            let point = at(subject, &[("resolution", resolution)]);
+            if let Some(before) = before {
+                let [worse, better] = [before, point].map(|point| error(point, "algorithm.recall"));
+                assert!(
+                    better >= worse,
+                    "{} {resolution}: {worse} to {better}",
+                    subject.scene
+                );
+                assert!(point.work.texel_fetches > before.work.texel_fetches);
+                assert!(point.work.steps_per_ray > before.work.steps_per_ray);
+            }
+            before = Some(point);
+        }
+        // The bracket is a step of four texels, and every halving halves it; what is
+        // left is found by halving, not by more of the march.
+        let mut bracket = 4.0;
+        for steps in ["1", "2", "3", "5", "8", "12"] {
+            let point = at(subject, &[("resolution", "0.25"), ("steps", steps)]);
+            bracket = 4.0 / f64::from(1 << steps.parse::<u32>().unwrap());
+            let median = error(point, "algorithm.hit-median");
+            // Along the longer axis; across, at most as much again.
+            assert!(
+                median <= bracket * std::f64::consts::SQRT_2 + 0.05,
+                "{} {steps}: {median} of {bracket}",
+                subject.scene
+            );
+        }
+        assert!(bracket < 0.01);
+        let converged = at(subject, &[("steps", "12")]);
+        assert!(
+            error(converged, "algorithm.hit-median") < 0.05,
+            "{}",
+            subject.scene
+        );
+        let linear = at(subject, &[("search", "linear"), ("resolution", "0.25")]);
+        let refined = at(subject, &[("resolution", "0.25")]);
+        assert!(
+            error(linear, "algorithm.hit-median") > 4.0 * error(refined, "algorithm.hit-median"),
+            "{}",
+            subject.scene
+        );
+    }
+}
+
+/// Otherwise another number format would be worth more than another setting.
+#[test]
+fn rounding_is_far_below_what_the_algorithm_leaves_out() {
+    for name in ["ssr", "bloom"] {
+        for subject in run(&options(name, 0)).subjects {
+            for point in subject.points.iter().filter(|point| point.id == "strict") {
+                let [rounding, algorithm] =
+                    ["rounding.colour", "algorithm.colour"].map(|metric| error(point, metric));
+                assert!(
+                    rounding * 10.0 <= algorithm,
+                    "{name} on {}: {rounding} of {algorithm}",
+                    subject.scene
+                );
+            }
+        }
+    }
+}
+
+/// A preset that another setting beats in both error and work is none.
+#[test]
+fn no_preset_is_beaten_in_work_and_error() {
+    for effect in effects().iter().filter(|effect| effect.name != "chain") {
+        let found = run(&options(effect.name, 2));
+        // The scene that the effect has most to do on.
+        let subject = &found.subjects[0];
+        let main = subject.mains()[0].id.clone();
+        let measured = |point: &Point| (point.work.operations, error(point, &main));
+        let presets: Vec<&Point> = subject
+            .points
+            .iter()
+            .filter(|point| point.preset.is_some() && point.arithmetic == "strict")
+            .collect();
+        assert!(!presets.is_empty(), "{}", effect.name);
+        for preset in presets {
+            let (work, off) = measured(preset);
+            for other in subject
+                .points
+                .iter()
+                .filter(|point| point.arithmetic == "strict")
+            {
+                let (other_work, other_off) = measured(other);
+                assert!(
+                    other_work > work || other_off > off || (other_work, other_off) == (work, off),
+                    "{} {:?}: {} beats {} with {other_work} of {work} operations and {other_off:e} of {off:e}",
+                    effect.name,
+                    preset.preset,
+                    other.id,
+                    preset.id
+                );
+            }
+        }
+    }
+}

@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use clap::Parser;
+use etalon_accuracy::chart::{Chart, Place};
 use etalon_accuracy::executors::Kind;
-use etalon_accuracy::model::Sweep;
+use etalon_accuracy::model::{Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::sweep::{Options, Progress, sweep};
 use etalon_accuracy::{profile, store, table};
@@ -45,6 +46,10 @@ struct Arguments {
     /// is gone on with.
     #[arg(long)]
     report: Option<PathBuf>,
+    /// Write each effect's chart of its main error on each scene and backend here,
+    /// as an SVG file of its own.
+    #[arg(long)]
+    charts: Option<PathBuf>,
     /// Write everything found to this file.
     #[arg(long)]
     json: Option<PathBuf>,
@@ -113,6 +118,9 @@ impl Arguments {
         shown.bar.finish_and_clear();
         let found = found.map_err(|error| error.to_string())?;
         print!("{}", table::text(&found));
+        if let Some(folder) = &self.charts {
+            charts(&found, folder)?;
+        }
         if let Some(path) = &self.json {
             let text = serde_json::to_string_pretty(&found).map_err(|error| error.to_string())?;
             write(path, &text)?;
@@ -127,6 +135,22 @@ impl Arguments {
         }
         Ok(())
     }
+}
+
+fn charts(sweep: &Sweep, folder: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    for subject in &sweep.subjects {
+        let Some(&main) = subject.mains().first() else {
+            continue;
+        };
+        for executor in &sweep.executors {
+            let chart = Chart::of(subject, main, executor).svg(Place::Alone);
+            let Subject { effect, scene, .. } = subject;
+            let file = format!("{effect}-{scene}-{}.svg", executor.id);
+            write(&folder.join(file), &chart)?;
+        }
+    }
+    Ok(())
 }
 
 fn write(path: &Path, text: &str) -> Result<(), String> {

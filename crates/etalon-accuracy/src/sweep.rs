@@ -24,7 +24,7 @@ use crate::executors::{self, Executor, Kind};
 use crate::judge::{self, Judge, JudgeError, Judgement};
 use crate::ladder::{self, Setting};
 use crate::metric::spread;
-use crate::model::{self, Outcome, Point, Subject, Sweep};
+use crate::model::{self, ErrorKind, Outcome, Point, Subject, Sweep};
 use crate::observe::Observed;
 use crate::pictures::{PictureError, Pictures};
 use crate::stage::{Stage, StageError};
@@ -200,9 +200,9 @@ impl Run<'_> {
     fn subject(&mut self, known: Option<&Subject>, share: Duration) -> Result<Subject, SweepError> {
         let begin = Instant::now();
         let knobs = ladder::knobs(self.effect);
+        let candidates = self.candidates(&knobs)?;
         let judge = judge::judge(self.effect.name, &self.stage)
             .map_err(|source| self.error("truth", source))?;
-        let candidates = self.candidates(&knobs)?;
         let mut subject = Subject {
             effect: self.effect.name.to_owned(),
             scene: self.stage.scene.to_owned(),
@@ -227,7 +227,7 @@ impl Run<'_> {
     }
 
     /// The settings to be tried. Those that plan to the very same work are one.
-    fn candidates(&self, knobs: &[KnobInfo]) -> Result<Vec<Candidate>, SweepError> {
+    fn candidates(&mut self, knobs: &[KnobInfo]) -> Result<Vec<Candidate>, SweepError> {
         let reference = exact_backend()?;
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
         let mut candidates: Vec<Candidate> = Vec::new();
@@ -510,6 +510,24 @@ fn knob_model(knob: &KnobInfo) -> model::Knob {
         unit: knob.unit.to_owned(),
         default: knob.default.to_string(),
     }
+}
+
+/// What to say where rounding is no small part of the error: with the settings that
+/// are the default, on the first executor, by the main measures.
+fn rounding(subject: &Subject) -> Option<String> {
+    let result = subject.points.first()?.results.first()?;
+    let of = |kind| {
+        let mains = subject.mains();
+        let main = mains.into_iter().find(|metric| metric.kind == kind)?;
+        result.errors.get(&main.id).copied()
+    };
+    let (rounding, algorithm) = (of(ErrorKind::Rounding)?, of(ErrorKind::Algorithm)?);
+    (rounding * 10.0 > algorithm).then(|| {
+        format!(
+            "{} on {}: rounding ({rounding:.1e}) is not far below all that is left of the algorithm's error ({algorithm:.1e}) with the default settings",
+            subject.effect, subject.scene
+        )
+    })
 }
 
 /// A name for all that a plan does: kernels, settings, sizes. The same on every

@@ -7,13 +7,14 @@ use std::fmt::Debug;
 
 use common::{PLAIN_SSR, Run, hash, image, texels};
 use etalon_core::Format;
+use etalon_core::kernel::Arithmetic;
 use etalon_effects::bloom::{Bloom, LightStorage, bloom};
 use etalon_effects::composite::Composite;
 use etalon_effects::exposure::{Exposed, Exposure};
 use etalon_effects::knob::{Domain, KnobError, KnobValue, Role, Tunable, tuned};
 use etalon_effects::quality::{Quality, preset};
 use etalon_effects::ssr::{HitStorage, Search, Ssr, march};
-use etalon_effects::{CameraParams, EffectError, effect, effects};
+use etalon_effects::{CameraParams, ChainSettings, EffectError, chain, effect, effects};
 
 /// What any table has to be.
 fn check<S: Tunable + Debug + PartialEq>() {
@@ -232,4 +233,41 @@ fn half_places_are_full_ones_rounded_and_a_linear_search_has_no_refinement() {
     let linear = marched(&linear, &camera);
     assert_eq!(linear.bytes, marched(&none, &camera).bytes);
     assert_ne!(linear.bytes, full.bytes);
+}
+
+/// A choice is another kernel, and the composite reads what bloom was stored in.
+#[test]
+fn every_storage_makes_the_same_picture_in_both_arithmetics() {
+    let world = etalon_scenes::scene("dark-room-lights").expect("registered");
+    let size = etalon_scenes::FrameSize::new(61, 35).expect("small");
+    let frame = world.frame(size).expect("small");
+    let shown = |storage, arithmetic| {
+        let settings = ChainSettings {
+            bloom: Some(Bloom {
+                storage,
+                ..Bloom::default()
+            }),
+            ..ChainSettings::full()
+        };
+        let mut run = Run::new();
+        run.arithmetic = arithmetic;
+        let inputs = run.import_frame(&frame);
+        let result = chain(&mut run.graph, &inputs, &settings).expect("valid");
+        texels(&run.output(result.picture))
+    };
+    let exact = shown(LightStorage::Full, Arithmetic::Strict);
+    for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {
+        for storage in [LightStorage::Full, LightStorage::Half, LightStorage::Packed] {
+            let picture = shown(storage, arithmetic);
+            // A step of the coarsest format is 1/32 of the bloom, which is some
+            // tenths of the light; encoding makes of a relative error e of light at
+            // most e / 2.4 of a value.
+            let worst = exact
+                .iter()
+                .zip(&picture)
+                .flat_map(|(a, b)| (0..3).map(|channel| (a[channel] - b[channel]).abs()));
+            let worst = worst.fold(0.0, f32::max);
+            assert!(worst <= 1.0 / 32.0, "{storage:?}, {arithmetic}: {worst}");
+        }
+    }
 }

@@ -16,6 +16,7 @@
 //! by [`colour`](super::colour).
 
 use etalon_core::texel::linear_to_srgb;
+use rayon::prelude::*;
 
 use super::{MetricError, Sum, same_size};
 
@@ -191,16 +192,21 @@ pub fn hdr<const N: usize>(
         .map(|(&found, &truth)| if finite(&found) { found } else { truth })
         .collect();
     let exposures = Exposures::of(truth.iter().map(luminance));
-    let mut values = vec![0.0_f32; truth.len()];
+    let none = || vec![0.0_f32; truth.len()];
     // Nothing to look for at any exposure.
-    if mended != truth {
-        for exposure in exposures.iter() {
-            let errors = ldr(&shown(&mended, exposure), &shown(&truth, exposure), size)?;
-            for (value, error) in values.iter_mut().zip(errors.values) {
-                *value = value.max(error);
-            }
-        }
-    }
+    let mut values = if mended == truth {
+        none()
+    } else {
+        // In any order: the largest is the largest.
+        let steps: Vec<f64> = exposures.iter().collect();
+        steps
+            .into_par_iter()
+            .map(|exposure| ldr(&shown(&mended, exposure), &shown(&truth, exposure), size))
+            .try_fold(none, |largest, errors| {
+                Ok(largest_of(largest, &errors?.values))
+            })
+            .try_reduce(none, |a, b| Ok(largest_of(a, &b)))?
+    };
     for (value, &broken) in values.iter_mut().zip(&broken) {
         if broken {
             *value = 1.0;
@@ -211,6 +217,13 @@ pub fn hdr<const N: usize>(
         exposures,
         non_finite: broken.iter().filter(|&&broken| broken).count(),
     })
+}
+
+fn largest_of(mut values: Vec<f32>, others: &[f32]) -> Vec<f32> {
+    for (value, &other) in values.iter_mut().zip(others) {
+        *value = value.max(other);
+    }
+    values
 }
 
 /// Red, green and blue, none below 0: the tone mapper shows darkness less than black

@@ -173,6 +173,7 @@ pub fn composite(
             ("bloom", size(graph, glow.bloom)),
         )?;
     }
+    let full = glow.is_some_and(|glow| graph.desc(glow.bloom).format == Format::Rgba32Float);
     let extent = graph.desc(colour).extent;
     let result = graph.texture(
         "composite.result",
@@ -185,7 +186,8 @@ pub fn composite(
         .set("exposure", exposed.factor)
         .feature("adapted", exposed.adaptation.is_some())
         .feature("bloom", glow.is_some())
-        .feature("hdr", curve.is_none());
+        .feature("hdr", curve.is_none())
+        .feature("full", full);
     if let Some(adaptation) = exposed.adaptation {
         pass = pass.read("adaptation", adaptation);
     }

@@ -223,6 +223,7 @@ impl Run<'_> {
             begin + share,
             &mut subject,
         )?;
+        self.notes.extend(rounding(&subject));
         Ok(subject)
     }
 

@@ -7,7 +7,8 @@
 //! * [`model`]: what a sweep found, as data;
 //! * [`metric`]: measures of error;
 //! * [`front`]: what costs least for its error;
-//! * [`chart`]: error against time, drawn.
+//! * [`chart`]: error against time, drawn;
+//! * [`report`]: the charts with all about every point, as a web page and a table.
 
 #![forbid(unsafe_code)]
 
@@ -15,4 +16,5 @@ pub mod chart;
 pub mod front;
 pub mod metric;
 pub mod model;
+pub mod report;
 mod text;

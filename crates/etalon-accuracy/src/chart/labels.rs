@@ -26,9 +26,9 @@ impl Area {
 /// Height of a name.
 pub(super) const HEIGHT: f64 = 15.0;
 
-/// About how wide a name is drawn.
+/// About how wide a name is drawn, in bold.
 pub(super) fn width(text: &str) -> f64 {
-    7.0 * text.chars().count() as f64
+    8.0 * text.chars().count() as f64
 }
 
 /// Where to write names beside their points: of a few places around each, nearest
@@ -53,7 +53,7 @@ pub(super) fn place(names: &[(f64, f64, f64)], points: &[(f64, f64)], bounds: Ar
             (-0.7, -1.0),
             (-0.7, 1.0),
         ];
-        let areas = [10.0, 22.0, 36.0, 52.0]
+        let areas = [12.0, 24.0, 38.0, 54.0]
             .into_iter()
             .flat_map(|far| around.map(|(across, down)| (far, at(far, across, down))));
         let cost = |&(far, area): &(f64, Area)| {
@@ -74,7 +74,7 @@ pub(super) fn place(names: &[(f64, f64, f64)], points: &[(f64, f64)], bounds: Ar
             far * 0.5 + 20.0 * names + points + 20.0 * outside
         };
         let best = areas.min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        placed.push(best.map_or_else(|| at(10.0, 1.0, 0.0), |(_, area)| area));
+        placed.push(best.map_or_else(|| at(12.0, 1.0, 0.0), |(_, area)| area));
     }
     placed
 }
@@ -95,7 +95,7 @@ mod tests {
         let [area] = place(&[(100.0, 100.0, 40.0)], &[(100.0, 100.0)], BOUNDS)[..] else {
             panic!("one name");
         };
-        assert_eq!((area.x, area.y), (110.0, 92.5));
+        assert_eq!((area.x, area.y), (112.0, 92.5));
     }
 
     #[test]

@@ -60,6 +60,11 @@ for (const section of document.querySelectorAll(".subject")) {
       link.dataset.executor = executor;
       parts.push(make("p", "", make("span", "badge bad", "dominated"), " by ", link, `: ${better[1]}`));
     }
+    if (result.picture || result.difference) {
+      parts.push(make("div", "pictures",
+        result.picture ? picture(result.picture, "The result") : null,
+        result.difference ? picture(result.difference, "Its difference from the truth") : null));
+    }
     parts.push(make("h5", "", "Settings"), pairs(point.settings));
     parts.push(make("h5", "", "Time, with quartiles"), make("p", "",
       make("strong", "", result.time ?? "not timed"), result.frames ? ` over ${result.frames} frames` : ""));
@@ -77,8 +82,6 @@ for (const section of document.querySelectorAll(".subject")) {
         others.map((other) => [other, `${point.results[other].short ?? "not timed"} · ${point.results[other].errors[metric] ?? "–"}`]),
         others.indexOf(executor)));
     }
-    if (result.picture) parts.push(picture(result.picture, "The result"));
-    if (result.difference) parts.push(picture(result.difference, "How it differs from the truth"));
     panel.replaceChildren(...parts);
   };
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::html::things;
 use super::presets::{is_preset, name};
-use super::verdict::{Verdicts, is_main, kind_name};
+use super::verdict::{Verdicts, first_metric, is_main, kind_name};
 use crate::chart::{is_default, outcome};
 use crate::model::{Executor, Point, Subject, Sweep};
 use crate::text::{bytes, count, escape, number, time};
@@ -24,17 +24,18 @@ pub(super) fn table(body: &mut String, sweep: &Sweep, subject: &Subject, verdict
     }
     body.push_str(
         "</select></label><label><input type=\"checkbox\" class=\"only-kept\"> Only what is best for its time, and presets</label></div>\n\
-         <p class=\"print-only muted\">On paper only what is best for its time by a main error, presets and the default; \
-         all settings are in points.csv.</p>\n\
+         <p class=\"print-only muted\">On paper only presets, the default, and what is best for its time by the first \
+         error that the page shows; points.csv has all of them.</p>\n\
          <div class=\"scroll tall\"><table class=\"sortable\">\n<thead>\n<tr>",
     );
     let unknown = unknown_knobs(subject);
-    let mut columns: Vec<(String, bool)> = Vec::new();
+    // Heading and class.
+    let mut columns: Vec<(String, &str)> = Vec::new();
     for heading in ["Setting", "Executor", "Arithmetic"] {
-        columns.push((heading.to_owned(), false));
+        columns.push((heading.to_owned(), ""));
     }
-    columns.push(("Standing".to_owned(), false));
-    columns.push(("Time".to_owned(), true));
+    columns.push(("Standing".to_owned(), ""));
+    columns.push(("Time".to_owned(), "figure"));
     for metric in &subject.metrics {
         let unit = if metric.unit.is_empty() {
             String::new()
@@ -43,23 +44,23 @@ pub(super) fn table(body: &mut String, sweep: &Sweep, subject: &Subject, verdict
         };
         columns.push((
             format!("{}: {}{unit}", kind_name(metric.kind), metric.name),
-            true,
+            "figure",
         ));
     }
     for knob in &subject.knobs {
-        columns.push((with_unit(&knob.name, &knob.unit), true));
+        columns.push((with_unit(&knob.name, &knob.unit), "figure"));
     }
     for knob in &unknown {
-        columns.push(((*knob).to_owned(), true));
+        columns.push(((*knob).to_owned(), "figure"));
     }
-    for heading in ["Memory", "Texel fetches", "Operations", "Steps per ray"] {
-        columns.push((heading.to_owned(), true));
+    columns.push(("Memory".to_owned(), "figure"));
+    for heading in ["Texel fetches", "Operations", "Steps per ray"] {
+        columns.push((heading.to_owned(), "figure work"));
     }
-    for (heading, figure) in columns {
+    for (heading, class) in columns {
         let _ = write!(
             body,
-            "<th scope=\"col\"{}><button type=\"button\">{}</button></th>",
-            if figure { " class=\"figure\"" } else { "" },
+            "<th scope=\"col\" class=\"{class}\"><button type=\"button\">{}</button></th>",
             escape(&heading)
         );
     }
@@ -110,7 +111,13 @@ fn row(
     let Some(found) = outcome(point, &executor.id) else {
         return;
     };
-    let kept = is_preset(subject, point) || verdicts.on_main_front(&executor.id, place);
+    let first = first_metric(subject);
+    let best = first.is_some_and(|first| verdicts.of(first, &executor.id, place).on_front);
+    let class = match (is_preset(subject, point), best) {
+        (true, _) => " class=\"preset kept\"",
+        (false, true) => " class=\"kept\"",
+        (false, false) => "",
+    };
     let preset = match (&point.preset, is_default(subject, point)) {
         (None, false) => String::new(),
         _ => format!(
@@ -122,7 +129,7 @@ fn row(
         body,
         "<tr data-point=\"{id}\" data-executor=\"{executor}\"{}><th scope=\"row\"><button type=\"button\" class=\"show\">{id}</button>{preset}</th>\
          <td>{executor}</td><td>{}</td><td class=\"standing\">",
-        if kept { " class=\"kept\"" } else { "" },
+        class,
         escape(&point.arithmetic),
         id = escape(&point.id),
         executor = escape(&executor.id),
@@ -148,23 +155,23 @@ fn row(
     value(body, Some(point.bytes as f64), &bytes(point.bytes));
     let work = &point.work;
     for counter in [work.texel_fetches, work.operations] {
-        value(body, Some(counter as f64), &count(counter));
+        cell(body, "figure work", Some(counter as f64), &count(counter));
     }
     let steps = work.steps_per_ray.map_or_else(|| "–".to_owned(), number);
-    value(body, work.steps_per_ray, &steps);
+    cell(body, "figure work", work.steps_per_ray, &steps);
     body.push_str("</tr>\n");
 }
 
-/// A cell with what it is sorted by.
+/// A figure with what it is sorted by.
 fn value(body: &mut String, value: Option<f64>, text: &str) {
-    let _ = match value.filter(|value| value.is_finite()) {
-        Some(value) => write!(
-            body,
-            "<td class=\"figure\" data-value=\"{value:e}\">{}</td>",
-            escape(text)
-        ),
-        None => write!(body, "<td class=\"figure\">{}</td>", escape(text)),
-    };
+    cell(body, "figure", value, text);
+}
+
+/// A cell of a class.
+fn cell(body: &mut String, class: &str, value: Option<f64>, text: &str) {
+    let value = value.filter(|value| value.is_finite());
+    let value = value.map_or_else(String::new, |value| format!(" data-value=\"{value:e}\""));
+    let _ = write!(body, "<td class=\"{class}\"{value}>{}</td>", escape(text));
 }
 
 /// For each metric whether the point is best for its time, or dominated although it

@@ -52,7 +52,6 @@ pub(super) fn first_metric(subject: &Subject) -> Option<usize> {
 
 /// The standing of all points of a subject.
 pub(super) struct Verdicts<'a> {
-    subject: &'a Subject,
     /// By metric and executor: of each point whether it is on the front, and which
     /// is better.
     standings: BTreeMap<(usize, &'a str), Vec<Standing>>,
@@ -75,7 +74,7 @@ impl<'a> Verdicts<'a> {
                 standings.insert((place, executor.id.as_str()), of_executor);
             }
         }
-        Self { subject, standings }
+        Self { standings }
     }
 
     pub(super) fn of(&self, metric: usize, executor: &str, point: usize) -> Standing {
@@ -84,13 +83,6 @@ impl<'a> Verdicts<'a> {
             .and_then(|all| all.get(point))
             .copied()
             .unwrap_or_default()
-    }
-
-    /// Whether a point is on the front of the main metric of any kind.
-    pub(super) fn on_main_front(&self, executor: &str, point: usize) -> bool {
-        (0..self.subject.metrics.len()).any(|metric| {
-            is_main(self.subject, metric) && self.of(metric, executor, point).on_front
-        })
     }
 
     /// How much better the other point is, in words.

@@ -214,7 +214,7 @@ fn reflection(
             Outcome {
                 executor: executor.id.clone(),
                 // One executor has not come to all of them yet.
-                time: (place < 2 || number % 9 != 0).then_some(Spread {
+                time: (place < 2 || !number.is_multiple_of(9)).then_some(Spread {
                     median,
                     lower: median * (0.99 - 0.02 * noise(number)),
                     upper: median * (1.02 + 0.1 * noise(number + 1)),

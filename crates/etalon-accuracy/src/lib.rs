@@ -14,6 +14,7 @@
 //! * [`model`], [`store`], [`pictures`]: what a sweep found, as data and in files;
 //! * [`front`](mod@front): what costs least for its error;
 //! * [`chart`]: error against time, drawn;
+//! * [`report`]: the charts with all about every point, as a web page and a table;
 //! * [`table`](mod@table), [`profile`](mod@profile): the fronts for a terminal, and
 //!   for settings that fit a budget.
 
@@ -29,6 +30,7 @@ pub mod model;
 pub mod observe;
 pub mod pictures;
 pub mod profile;
+pub mod report;
 pub mod stage;
 pub mod store;
 pub mod sweep;

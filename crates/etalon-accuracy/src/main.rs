@@ -12,7 +12,7 @@ use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::sweep::{Options, Progress, sweep};
-use etalon_accuracy::{profile, store, table};
+use etalon_accuracy::{profile, report, store, table};
 use etalon_effects::{EffectEntry, effect, effects};
 use etalon_scenes::FrameSize;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -131,7 +131,8 @@ impl Arguments {
             write(path, &text)?;
         }
         if let Some(folder) = &self.report {
-            store::keep(&found, folder).map_err(|error| error.to_string())?;
+            let page = report::write(&found, folder).map_err(|error| error.to_string())?;
+            println!("{}", page.display());
         }
         Ok(())
     }
@@ -179,7 +180,7 @@ impl Progress for Shown<'_> {
 
     fn keep(&mut self, sweep: &Sweep) -> Result<(), String> {
         self.folder
-            .map_or(Ok(()), |folder| store::keep(sweep, folder))
+            .map_or(Ok(()), |folder| store::keep(sweep, folder).map(|_| ()))
             .map_err(|error| error.to_string())
     }
 }

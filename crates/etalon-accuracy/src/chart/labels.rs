@@ -18,6 +18,16 @@ impl Area {
             * along(self.y, self.height, other.y, other.height)
     }
 
+    /// With room around it.
+    const fn grown(&self, by: f64) -> Self {
+        Self {
+            x: self.x - by,
+            y: self.y - by,
+            width: self.width + 2.0 * by,
+            height: self.height + 2.0 * by,
+        }
+    }
+
     const fn size(&self) -> f64 {
         self.width * self.height
     }
@@ -26,9 +36,9 @@ impl Area {
 /// Height of a name.
 pub(super) const HEIGHT: f64 = 15.0;
 
-/// About how wide a name is drawn.
+/// About how wide a name is drawn, in bold.
 pub(super) fn width(text: &str) -> f64 {
-    7.0 * text.chars().count() as f64
+    8.0 * text.chars().count() as f64
 }
 
 /// Where to write names beside their points: of a few places around each, nearest
@@ -36,6 +46,7 @@ pub(super) fn width(text: &str) -> f64 {
 /// lies outside. The same input gives the same places.
 pub(super) fn place(names: &[(f64, f64, f64)], points: &[(f64, f64)], bounds: Area) -> Vec<Area> {
     let mut placed: Vec<Area> = Vec::new();
+    let names_of = names;
     for &(x, y, width) in names {
         let at = |far: f64, across: f64, down: f64| Area {
             x: x + across * far + (across - 1.0) * width / 2.0,
@@ -53,28 +64,30 @@ pub(super) fn place(names: &[(f64, f64, f64)], points: &[(f64, f64)], bounds: Ar
             (-0.7, -1.0),
             (-0.7, 1.0),
         ];
-        let areas = [10.0, 22.0, 36.0, 52.0]
+        let areas = [12.0, 24.0, 38.0, 54.0]
             .into_iter()
             .flat_map(|far| around.map(|(across, down)| (far, at(far, across, down))));
         let cost = |&(far, area): &(f64, Area)| {
-            let names: f64 = placed.iter().map(|other| area.overlap(other)).sum();
-            let points: f64 = points
-                .iter()
-                .map(|&(x, y)| {
-                    area.overlap(&Area {
-                        x: x - 4.0,
-                        y: y - 4.0,
-                        width: 8.0,
-                        height: 8.0,
-                    })
+            let roomy = area.grown(3.0);
+            let names: f64 = placed.iter().map(|other| roomy.overlap(other)).sum();
+            let covered = |&(x, y): &(f64, f64), size: f64| {
+                area.overlap(&Area {
+                    x: x - size / 2.0,
+                    y: y - size / 2.0,
+                    width: size,
+                    height: size,
                 })
-                .sum();
+            };
+            let points: f64 = points.iter().map(|point| covered(point, 8.0)).sum();
+            // Points with names are larger, and matter more.
+            let named = names_of.iter().map(|&(x, y, _)| covered(&(x, y), 18.0));
+            let points = points + 5.0 * named.sum::<f64>();
             let outside = area.size() - area.overlap(&bounds);
             // A name on a name cannot be read; one on a point can.
             far * 0.5 + 20.0 * names + points + 20.0 * outside
         };
         let best = areas.min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        placed.push(best.map_or_else(|| at(10.0, 1.0, 0.0), |(_, area)| area));
+        placed.push(best.map_or_else(|| at(12.0, 1.0, 0.0), |(_, area)| area));
     }
     placed
 }
@@ -95,7 +108,7 @@ mod tests {
         let [area] = place(&[(100.0, 100.0, 40.0)], &[(100.0, 100.0)], BOUNDS)[..] else {
             panic!("one name");
         };
-        assert_eq!((area.x, area.y), (110.0, 92.5));
+        assert_eq!((area.x, area.y), (112.0, 92.5));
     }
 
     #[test]

@@ -8,7 +8,7 @@ mod scale;
 
 use std::fmt::Write;
 
-use crate::front::{Candidate, dominated, front};
+use crate::front::{Candidate, front};
 use crate::model::{Executor, Metric, Outcome, Point, Spread, Subject};
 use crate::text;
 use labels::Area;
@@ -101,12 +101,6 @@ pub(crate) fn is_default(subject: &Subject, point: &Point) -> bool {
     !point.settings.is_empty() && point.settings.iter().all(default)
 }
 
-/// How a point did on an executor.
-pub(crate) fn outcome<'a>(point: &'a Point, executor: &str) -> Option<&'a Outcome> {
-    let mut results = point.results.iter();
-    results.find(|outcome| outcome.executor == executor)
-}
-
 /// Time with quartiles.
 pub(crate) fn spread_text(spread: &Spread) -> String {
     format!(
@@ -126,7 +120,7 @@ impl Chart {
         let all = subject.points.iter().flat_map(|point| &point.results);
         let missing = Missing::of(metric, all);
         let mark = |point: &Point| {
-            let outcome = outcome(point, &executor.id)?;
+            let outcome = point.on(&executor.id)?;
             let value = outcome.errors.get(&metric.id).copied();
             let time = outcome
                 .time
@@ -230,11 +224,37 @@ fn head(svg: &mut String, chart: &Chart, place: Place) {
 struct Drawn<'a> {
     mark: &'a Mark,
     time: Spread,
+    error: f64,
     x: f64,
     y: f64,
+    /// Nothing of its series dominates it.
     on_front: bool,
-    /// By another, which is faster or better and not worse.
-    dominated: bool,
+}
+
+impl Drawn<'_> {
+    /// Whether it is there only to be compared with.
+    const fn is_faint(&self) -> bool {
+        !self.on_front && self.mark.name.is_none() && !self.mark.default
+    }
+}
+
+/// The series drawn: the known ones first, others as they come.
+fn series_of<'a>(points: &[Drawn<'a>]) -> Vec<&'a str> {
+    let mut all: Vec<&'a str> = Vec::new();
+    for known in ["strict", "fast"] {
+        let mut points = points.iter();
+        all.extend(
+            points
+                .find(|point| point.mark.series == known)
+                .map(|point| point.mark.series.as_str()),
+        );
+    }
+    for point in points {
+        if !all.contains(&point.mark.series.as_str()) {
+            all.push(&point.mark.series);
+        }
+    }
+    all
 }
 
 /// A chart laid out.
@@ -290,30 +310,36 @@ impl<'a> Drawing<'a> {
         let errors = (has_more || !has_zero)
             .then(|| Scale::new(kept.iter().map(|(_, _, error)| *error), [floor, TOP]));
         let zero = has_zero.then_some(BOTTOM - STRIP / 2.0);
-        let candidates: Vec<Candidate> = kept
+        let mut points: Vec<Drawn<'_>> = kept
             .iter()
-            .map(|(_, time, error)| Candidate {
-                cost: time.median,
-                error: *error,
-            })
-            .collect();
-        let on_front = front(&candidates);
-        let points = kept
-            .iter()
-            .enumerate()
-            .map(|(place, &(mark, time, error))| Drawn {
+            .map(|&(mark, time, error)| Drawn {
                 mark,
                 time,
+                error,
                 x: times.place(time.median),
                 y: match (error > 0.0, &errors, zero) {
                     (true, Some(errors), _) => errors.place(error),
                     (_, _, Some(zero)) => zero,
                     _ => floor,
                 },
-                on_front: on_front.contains(&place),
-                dominated: dominated(&candidates, place).is_some(),
+                on_front: false,
             })
             .collect();
+        for series in series_of(&points) {
+            let of_series: Vec<usize> = (0..points.len())
+                .filter(|&place| points[place].mark.series == series)
+                .collect();
+            let candidates: Vec<Candidate> = of_series
+                .iter()
+                .map(|&place| Candidate {
+                    cost: points[place].time.median,
+                    error: points[place].error,
+                })
+                .collect();
+            for place in front(&candidates) {
+                points[of_series[place]].on_front = true;
+            }
+        }
         Self {
             points,
             times,
@@ -421,19 +447,13 @@ impl<'a> Drawing<'a> {
     /// What is drawn how: only what is there.
     fn legend(&self, svg: &mut String) {
         let mut entries: Vec<(String, String)> = Vec::new();
-        for series in ["strict", "fast"]
-            .into_iter()
-            .chain(self.points.iter().map(|point| point.mark.series.as_str()))
-        {
-            let there = self.points.iter().any(|point| point.mark.series == series);
-            let name = text::escape(series);
-            if there && entries.iter().all(|(_, known)| *known != name) {
-                let shape = format!(
-                    "<circle class=\"{}\" cx=\"0\" cy=\"-4.5\" r=\"5\"/>",
-                    series_class(series)
-                );
-                entries.push((shape, name));
-            }
+        for series in series_of(&self.points) {
+            let class = series_class(series);
+            // A point on the line of its front.
+            let shape = format!(
+                "<path class=\"front {class}\" d=\"M-12 -4.5H12\"/><circle class=\"{class}\" cx=\"0\" cy=\"-4.5\" r=\"5\"/>",
+            );
+            entries.push((shape, text::escape(series)));
         }
         if self.points.iter().any(|point| point.mark.default) {
             entries.push((
@@ -441,36 +461,33 @@ impl<'a> Drawing<'a> {
                 "default".to_owned(),
             ));
         }
-        if !self.points.is_empty() {
-            entries.push((
-                "<path class=\"front\" d=\"M-8 -9H0V0H8\"/>".to_owned(),
-                "best for its time".to_owned(),
-            ));
-        }
         let mut right = RIGHT;
         for (shape, name) in entries.iter().rev() {
-            let left = right - labels::width(name) - 18.0;
+            let left = right - 0.9 * labels::width(name) - 22.0;
             let _ = writeln!(
                 svg,
-                "<g class=\"legend\" transform=\"translate({left:.1} {})\">{shape}<text x=\"13\" y=\"0\">{name}</text></g>",
+                "<g class=\"legend\" transform=\"translate({left:.1} {})\">{shape}<text x=\"18\" y=\"0\">{name}</text></g>",
                 TOP - 16.0
             );
             right = left - 18.0;
         }
     }
 
-    /// What is reachable within a time: level until something better is.
+    /// What is reachable within a time, of each series: level until something better
+    /// is.
     fn front(&self, svg: &mut String) {
-        let mut path = String::new();
-        for point in self.points.iter().filter(|point| point.on_front) {
-            let _ = if path.is_empty() {
-                write!(path, "M{:.1} {:.1}", point.x, point.y)
-            } else {
-                write!(path, "H{:.1}V{:.1}", point.x, point.y)
-            };
-        }
-        if !path.is_empty() {
-            let _ = writeln!(svg, "<path class=\"front\" d=\"{path}H{RIGHT}\"/>");
+        for series in series_of(&self.points) {
+            let mut path = String::new();
+            let of_series = |point: &&Drawn<'_>| point.on_front && point.mark.series == series;
+            for point in self.points.iter().filter(of_series) {
+                let _ = if path.is_empty() {
+                    write!(path, "M{:.1} {:.1}", point.x, point.y)
+                } else {
+                    write!(path, "H{:.1}V{:.1}", point.x, point.y)
+                };
+            }
+            let class = series_class(series);
+            let _ = writeln!(svg, "<path class=\"front {class}\" d=\"{path}H{RIGHT}\"/>");
         }
     }
 
@@ -487,7 +504,7 @@ impl<'a> Drawing<'a> {
                 svg,
                 "<path class=\"bar {}{}\" d=\"M{from:.1} {:.1}v6m0 -3H{to:.1}m0 -3v6\"/>",
                 series_class(&point.mark.series),
-                if point.dominated { " dominated" } else { "" },
+                if point.is_faint() { " faint" } else { "" },
                 y - 3.0,
             );
         }
@@ -522,7 +539,7 @@ impl<'a> Drawing<'a> {
                 "point {}{}{}",
                 series_class(&mark.series),
                 if point.on_front { " on-front" } else { "" },
-                if point.dominated { " dominated" } else { "" },
+                if point.is_faint() { " faint" } else { "" },
             );
             let focus = match place {
                 Place::Page => " tabindex=\"0\"",

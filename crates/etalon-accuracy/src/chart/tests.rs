@@ -337,7 +337,7 @@ fn presets_are_named_the_default_is_ringed_and_the_front_is_a_line() {
     assert_eq!(with_class("front").len(), 2);
     let points = points(&chart);
     let class = |id| by_id(&points, id).get("class").unwrap();
-    assert!(class("h").contains("dominated") && !class("h").contains("on-front"));
+    assert!(!class("h").contains("on-front"));
     for id in ["l", "m", "x"] {
         assert!(class(id).contains("on-front"), "{id}");
     }

@@ -1,5 +1,7 @@
 //! What a sweep found, in a file that a later run goes on with.
 
+mod sound;
+
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -23,7 +25,7 @@ pub enum StoreError {
         source: std::io::Error,
     },
     /// The file is not what this program writes.
-    #[error("{} is no sweep that this program kept: {source}; move it away to begin anew", path.display())]
+    #[error("{} is no sweep: {source}; move it away to begin anew", path.display())]
     Content {
         /// Which.
         path: PathBuf,
@@ -32,22 +34,39 @@ pub enum StoreError {
     },
 }
 
-/// Keeps a sweep in a folder, which is made if it is not there. Whoever stops the
-/// program while it writes finds the file as it was before.
+/// Keeps a sweep in a folder, which is made if it is not there.
+///
+/// JSON has no infinity and no NaN: such numbers are left out, and the notes say so.
+/// What was kept is returned.
 ///
 /// # Errors
 /// If the folder or the file cannot be written.
-pub fn keep(sweep: &Sweep, folder: &Path) -> Result<(), StoreError> {
-    let path = folder.join(FILE);
-    let file = |source| StoreError::File {
-        path: path.clone(),
+pub fn keep(sweep: &Sweep, folder: &Path) -> Result<Sweep, StoreError> {
+    let sound = sound::sound(sweep);
+    let text = serde_json::to_string_pretty(&sound).map_err(|source| StoreError::Content {
+        path: folder.join(FILE),
         source,
+    })?;
+    replace(folder, FILE, &text)?;
+    Ok(sound)
+}
+
+/// Writes a file into a folder, which is made if it is not there. Whoever stops the
+/// program meanwhile finds the file as it was before.
+///
+/// # Errors
+/// If the folder or the file cannot be written.
+pub(crate) fn replace(folder: &Path, name: &str, text: &str) -> Result<PathBuf, StoreError> {
+    let at = |path: &Path| {
+        let path = path.to_owned();
+        move |source| StoreError::File { path, source }
     };
-    let text = serde_json::to_string_pretty(sweep).map_err(|error| file(error.into()))?;
-    std::fs::create_dir_all(folder).map_err(file)?;
-    let new = folder.join("sweep.json.new");
-    std::fs::write(&new, text).map_err(file)?;
-    std::fs::rename(&new, &path).map_err(file)
+    std::fs::create_dir_all(folder).map_err(at(folder))?;
+    let path = folder.join(name);
+    let part = folder.join(format!("{name}.part"));
+    std::fs::write(&part, text).map_err(at(&part))?;
+    std::fs::rename(&part, &path).map_err(at(&path))?;
+    Ok(path)
 }
 
 /// The sweep kept in a folder, if one is.

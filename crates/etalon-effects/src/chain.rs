@@ -5,6 +5,8 @@ use etalon_core::graph::{Graph, Texture};
 use crate::bloom::{Bloom, bloom};
 use crate::composite::{Composite, Glow, composite};
 use crate::exposure::{Exposed, Exposure, exposure};
+use crate::knob::Tunable;
+use crate::quality::Quality;
 use crate::ssr::{Ssr, ssr};
 use crate::{EffectError, SceneInputs, SettingError};
 
@@ -31,6 +33,17 @@ impl ChainSettings {
             exposure: Some(Exposure::default()),
             bloom: Some(Bloom::default()),
             composite: Composite::default(),
+        }
+    }
+
+    /// Every effect with the settings of a preset.
+    #[must_use]
+    pub fn preset(quality: Quality) -> Self {
+        Self {
+            ssr: Some(Ssr::preset(quality)),
+            exposure: Some(Exposure::preset(quality)),
+            bloom: Some(Bloom::preset(quality)),
+            composite: Composite::preset(quality),
         }
     }
 

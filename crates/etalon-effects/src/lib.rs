@@ -24,6 +24,10 @@
 //! range, and its cost. A value outside of its range, NaN included, is a
 //! [`SettingError`]; none is clamped in silence.
 //!
+//! Beside each struct stands a table of its [`knob`]s: ranges, and values worth
+//! trying. [`quality`] has presets, [`budget`] picks settings for a time, and the
+//! `truth` of each effect says in f64 what an ideal implementation would give.
+//!
 //! # Any input
 //! Kernels make imported values finite where they first read them, so a NaN in
 //! one texel costs that texel and not the picture. Every effect gives finite

@@ -113,6 +113,13 @@ fn presets_set_accuracy_and_nothing_else() {
         Ssr::default().blur_radius
     );
     assert_ne!(Ssr::preset(Quality::Low), Ssr::default());
+    for quality in Quality::ALL {
+        let settings = ChainSettings::preset(quality);
+        assert_eq!(settings.validate(), Ok(()));
+        assert_eq!(settings.ssr, Some(Ssr::preset(quality)));
+        assert_eq!(settings.bloom, Some(Bloom::preset(quality)));
+        assert_eq!(settings.exposure, Some(Exposure::preset(quality)));
+    }
 }
 
 #[test]

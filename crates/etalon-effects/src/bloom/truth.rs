@@ -20,8 +20,10 @@
 //!
 //! Of the last level on there is nothing wider, so a chain with fewer levels is
 //! an approximation: the truth has as many as the effect would take at the top of
-//! the ladder of `levels`. The picture goes on outside as its edge. `storage`
-//! does not enter.
+//! the ladder of `levels`. The picture goes on outside as its edge. (The effect
+//! repeats the edge of each level, whose texels reach ever further into the
+//! picture; near edges that differs, and in the energy of small pictures it
+//! shows.) `storage` does not enter.
 //!
 //! With `suppress_fireflies` the first `D` is a mean weighted by
 //! `1 / (1 + luminance)` of the light that blooms, divided by the sum of the

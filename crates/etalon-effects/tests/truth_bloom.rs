@@ -8,7 +8,7 @@ use common::{Run, hash, image, texels};
 use etalon_core::Format;
 use etalon_core::image::ImageData;
 use etalon_effects::EffectError;
-use etalon_effects::bloom::truth::{bloom, bloom_of, energy, levels};
+use etalon_effects::bloom::truth::{Edges, bloom, bloom_of, energy, levels};
 use etalon_effects::bloom::{Bloom, LightStorage, bloom as effect};
 use etalon_effects::exposure::Exposed;
 use etalon_effects::truth::Plane;
@@ -130,7 +130,8 @@ fn it_is_the_convolution_with_the_composed_kernel() {
                     scatter: scatter as f32,
                     ..plain()
                 };
-                let result = bloom_of(&picture, 1.0, &settings, levels).expect("valid");
+                let result =
+                    bloom_of(&picture, 1.0, &settings, levels, Edges::Picture).expect("valid");
                 assert_eq!(result.size(), [width.div_ceil(2), height.div_ceil(2)]);
                 // The chain ends where one texel is left.
                 let mut side = width.max(height);
@@ -179,10 +180,13 @@ fn a_constant_picture_stays_that_constant() {
                 suppress_fireflies,
                 ..plain()
             };
-            let result = bloom(&picture.expect("small"), 1.0, &settings).expect("valid");
-            for texel in result.texels() {
-                for (got, expected) in texel.iter().zip([1.7, 0.3, 1365.0, 1.0]) {
-                    assert!((got / expected - 1.0).abs() <= 1e-10, "{texel:?}");
+            let picture = picture.expect("small");
+            for edges in [Edges::Picture, Edges::Levels] {
+                let result = bloom_of(&picture, 1.0, &settings, 12, edges).expect("valid");
+                for texel in result.texels() {
+                    for (got, expected) in texel.iter().zip([1.7, 0.3, 1365.0, 1.0]) {
+                        assert!((got / expected - 1.0).abs() <= 1e-10, "{texel:?}");
+                    }
                 }
             }
         }
@@ -200,7 +204,8 @@ fn an_impulse_keeps_its_energy() {
             let picture = Plane::from_fn(104, 104, |x, y| {
                 [f64::from(u8::from((x, y) == (px, py))), 0.0, 0.0, 1.0]
             });
-            let result = bloom_of(&picture.expect("small"), 1.0, &settings, 3).expect("valid");
+            let result = bloom_of(&picture.expect("small"), 1.0, &settings, 3, Edges::Picture)
+                .expect("valid");
             let [red, green, blue] = energy(&result);
             assert_eq!((green, blue), (0.0, 0.0));
             // A texel of the result stands for four.
@@ -242,7 +247,14 @@ fn it_is_the_mean_of_the_kernels_results_over_all_alignments() {
         let place = |at: u32| i64::from(at) - i64::from(first);
         [pattern(place(x), place(y)); 4]
     });
-    let truth = bloom_of(&still.expect("small"), 1.0, &settings, levels).expect("valid");
+    let truth = bloom_of(
+        &still.expect("small"),
+        1.0,
+        &settings,
+        levels,
+        Edges::Picture,
+    )
+    .expect("valid");
     let half = i64::from(side / 2);
     let mut mean = vec![0.0; (half * half) as usize];
     // Moved by two texels the first level is only moved by one.
@@ -342,28 +354,45 @@ fn more_levels_come_nearer() {
         ..Bloom::default()
     };
     assert_eq!(levels(plane.size()), 8);
-    let truth = bloom(&plane, 1.0, &settings).expect("valid");
-    let size: f64 = truth.texels().iter().map(|texel| texel[1].powi(2)).sum();
-    let mut previous = f64::INFINITY;
-    for count in [1, 2, 4, 8] {
-        let result = computed(
-            &frame.colour,
-            &Bloom {
+    let mut last = Vec::new();
+    for edges in [Edges::Picture, Edges::Levels] {
+        let truth = bloom_of(&plane, 1.0, &settings, 8, edges).expect("valid");
+        let size: f64 = truth.texels().iter().map(|texel| texel[1].powi(2)).sum();
+        let mut previous = f64::INFINITY;
+        for count in [1, 2, 4, 8] {
+            let settings = Bloom {
                 levels: count,
                 ..settings
-            },
-        );
-        let pairs = truth.texels().iter().zip(&result);
-        let error: f64 = pairs.map(|(a, b)| (a[1] - f64::from(b[1])).powi(2)).sum();
-        let relative = (error / size).sqrt();
-        let light: f64 = result.iter().map(|texel| f64::from(texel[1])).sum();
-        println!(
-            "{count} levels: {relative:.4}, energy {:+.4}",
-            light / energy(&truth)[1] - 1.0
-        );
-        assert!(relative < previous, "{count}: {relative} {previous}");
-        previous = relative;
+            };
+            let result = computed(&frame.colour, &settings);
+            let pairs = truth.texels().iter().zip(&result);
+            let error: f64 = pairs.map(|(a, b)| (a[1] - f64::from(b[1])).powi(2)).sum();
+            let relative = (error / size).sqrt();
+            let light: f64 = result.iter().map(|texel| f64::from(texel[1])).sum();
+            println!(
+                "{edges:?}, {count} levels: {relative:.4}, energy {:+.4}",
+                light / energy(&truth)[1] - 1.0
+            );
+            assert!(relative < previous, "{count}: {relative} {previous}");
+            previous = relative;
+        }
+        last.push(previous);
     }
+    // With the effect's own edges what is left is less.
+    assert!(last[1] < 0.5 * last[0], "{last:?}");
+}
+
+#[test]
+fn edges_do_not_matter_in_the_middle_of_black() {
+    let picture = Plane::from_fn(128, 96, |x, y| {
+        let inside = (60..68).contains(&x) && (44..52).contains(&y);
+        [f64::from(hash(x + 128 * y) % 64) * f64::from(u8::from(inside)); 4]
+    });
+    let picture = picture.expect("small");
+    // Three levels reach 38.5 texels.
+    let [a, b] = [Edges::Picture, Edges::Levels]
+        .map(|edges| bloom_of(&picture, 1.0, &plain(), 3, edges).expect("valid"));
+    assert_eq!(a, b);
 }
 
 #[test]
@@ -411,6 +440,6 @@ fn odd_input_is_refused_or_counts_as_none() {
         ..plain()
     };
     assert!(bloom(&picture, 1.0, &settings).is_err());
-    assert!(bloom_of(&picture, 1.0, &plain(), 0).is_err());
-    assert!(bloom_of(&picture, 1.0, &plain(), 13).is_err());
+    assert!(bloom_of(&picture, 1.0, &plain(), 0, Edges::Picture).is_err());
+    assert!(bloom_of(&picture, 1.0, &plain(), 13, Edges::Picture).is_err());
 }

@@ -114,17 +114,19 @@ fn the_kernel_converges_to_it() {
         let agreement = agreement(&truth, &marched(&frame, &settings), size);
         println!("{name}: {agreement:?}");
         assert!(agreement.true_hits > 1000, "{name}: {agreement:?}");
-        if name == "mirror-planes" {
-            // One surface, which no ray passes beside. Places in f32 on a line of
-            // up to 23 171 texels: 2^-24 of the distance relative to thousandths
-            // of a texel at grazing angles.
-            assert!(agreement.both > 0.99, "{agreement:?}");
-            assert!(agreement.place[0] < 0.05, "{agreement:?}");
-        } else {
-            // A cell crossed at a corner between two looks can be the first hit.
-            assert!(agreement.both > 0.9, "{name}: {agreement:?}");
-            assert!(agreement.place[0] < 0.5, "{name}: {agreement:?}");
-        }
+        // Halved 24 times and stored in f32, a place is within some 2^-24 of the
+        // picture's width where both find the same crossing, which is the rule.
+        assert!(agreement.place[0] < 1e-4, "{name}: {agreement:?}");
+        // The kernel looks at each cell once, about its middle. A ray toward the
+        // eye can be behind a cell's surface where it enters the cell and before
+        // it again in the middle, and a thin thing can be passed at its corner:
+        // the first of those hits are found later or not at all, at outlines and
+        // on surfaces that are steps of one texel.
+        let share = agreement.found as f64 / agreement.true_hits as f64;
+        assert!(share > 0.95, "{name}: {agreement:?}");
+        assert!(agreement.close > 0.9, "{name}: {agreement:?}");
+        let alike = if name == "mirror-planes" { 0.99 } else { 0.95 };
+        assert!(agreement.both > alike, "{name}: {agreement:?}");
     }
 }
 
@@ -148,8 +150,8 @@ fn settings_of_accuracy_do_not_enter() {
 
 #[test]
 fn the_picture_is_the_effect_rounded() {
-    // Storage in f16 rounds four times on the way, 2^-11 each, and where hits
-    // agree to a small part of a texel, so do the colours there.
+    // Storage in f16 rounds four times on the way, 2^-11 each, relative to the
+    // light but for the darkest. Where the hits are the same, that is all.
     for (name, blend) in [("mirror-planes", Blend::Add), ("wet-floor", Blend::Replace)] {
         let frame = frame(name, 160, 90);
         let settings = Ssr {
@@ -175,8 +177,10 @@ fn the_picture_is_the_effect_rounded() {
         let quantile = |share: f64| errors[((errors.len() - 1) as f64 * share) as usize];
         let quantiles = [0.5, 0.9, 0.99, 1.0].map(quantile);
         println!("{name}: {quantiles:?}");
-        assert!(quantiles[0] <= 4.0 / 2048.0, "{name}: {quantiles:?}");
-        assert!(quantiles[1] <= 0.1, "{name}: {quantiles:?}");
+        // In the one scene all hits that show are the same; in the other most.
+        let share = if name == "mirror-planes" { 3 } else { 0 };
+        assert!(quantiles[share] <= 4.0 / 2048.0, "{name}: {quantiles:?}");
+        assert!(quantiles[1] <= 0.05, "{name}: {quantiles:?}");
     }
 }
 

@@ -20,8 +20,12 @@
 //!
 //! Of the last level on there is nothing wider, so a chain with fewer levels is
 //! an approximation: the truth has as many as the effect would take at the top of
-//! the ladder of `levels`. The picture goes on outside as its edge. `storage`
-//! does not enter.
+//! the ladder of `levels`. `storage` does not enter.
+//!
+//! The picture goes on outside as its edge, which is what makes it a convolution.
+//! The effect repeats the edge of each level instead, whose texels reach ever
+//! further into the picture; near edges that is another thing, and a bright one
+//! there weighs less. [`Edges`] has both.
 //!
 //! With `suppress_fireflies` the first `D` is a mean weighted by
 //! `1 / (1 + luminance)` of the light that blooms, divided by the sum of the
@@ -224,6 +228,17 @@ fn bright(texel: [f64; 4], exposure: f64, settings: &Bloom) -> DVec4 {
     (blooming * weight).extend(weight)
 }
 
+/// What lies beyond the edges of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Edges {
+    /// The picture's own edge, without end: the bloom is a convolution.
+    #[default]
+    Picture,
+    /// Of each level the edge of that level, as the effect has it: what differs
+    /// from the effect is then the alignment of its levels, and not the edges.
+    Levels,
+}
+
 /// How far beyond the picture, in its texels, the values of a level differ from
 /// those at its edge, and how far they are needed.
 struct Reach {
@@ -232,7 +247,7 @@ struct Reach {
 }
 
 impl Reach {
-    /// The places kept of a side of so many texels of half size; two more than
+    /// The places kept of a side of so many texels of half size: two more than
     /// needed, for those that lie half a place off.
     fn span(&self, side: u32) -> Span {
         let margin = (self.varies.min(self.needed) / 2.0).ceil() as i64 + 2;
@@ -275,11 +290,18 @@ fn reaches(count: u32) -> Vec<[Reach; 2]> {
 /// If a setting is out of range, `exposure` is negative or no number, or memory
 /// runs out.
 pub fn bloom(colour: &Plane, exposure: f64, settings: &Bloom) -> Result<Plane, EffectError> {
-    bloom_of(colour, exposure, settings, levels(colour.size()))
+    bloom_of(
+        colour,
+        exposure,
+        settings,
+        levels(colour.size()),
+        Edges::Picture,
+    )
 }
 
 /// As [`bloom`] with a number of levels from 1 to 12, or fewer where the picture
-/// is then one texel: what a chain of so many approximates.
+/// is then one texel, which is what a chain of so many approximates; and with a
+/// choice of edges.
 ///
 /// # Errors
 /// As [`bloom`], or if the number is out of range.
@@ -288,13 +310,23 @@ pub fn bloom_of(
     exposure: f64,
     settings: &Bloom,
     levels: u32,
+    edges: Edges,
 ) -> Result<Plane, EffectError> {
     settings.validate()?;
     Settings("bloom").count("levels", levels, 1, 12)?;
     not_negative("bloom", "exposure", exposure)?;
     let side = colour.size().map(|side| side.div_ceil(2));
     let reaches = reaches(halvings(colour.size(), levels));
-    let spans = |reach: &Reach| side.map(|side| reach.span(side));
+    let spans = |index: usize, reach: &Reach| {
+        side.map(|side| match edges {
+            Edges::Picture => reach.span(side),
+            // From the second level on there are places on both edges.
+            Edges::Levels => Span {
+                first: 0,
+                count: i64::from(side) + i64::from(index > 0),
+            },
+        })
+    };
 
     let [columns, rows] = colour.size().map(|side| Span {
         first: 0,
@@ -313,7 +345,7 @@ pub fn bloom_of(
     // 2i + 1 of the picture; from the second level on places lie a texel further
     // left, since odd multiples of half their texel's size lie between.
     let odd = |place: i64| place.div_euclid(2);
-    let mut first = picture.halved(2, |place| (place + 1) / 2, spans(&reaches[0][0]))?;
+    let mut first = picture.halved(2, |place| (place + 1) / 2, spans(0, &reaches[0][0]))?;
     drop(picture);
     for value in &mut first.values {
         *value /= value.w;
@@ -323,8 +355,8 @@ pub fn bloom_of(
         let above = &down[level - 1];
         // In steps of two texels, half a texel of 2^level is 2^(level−2).
         let next = match level {
-            1 => above.halved(1, |place| odd(place - 1), spans(reach))?,
-            _ => above.halved(1, |place| place << (level - 2), spans(reach))?,
+            1 => above.halved(1, |place| odd(place - 1), spans(level, reach))?,
+            _ => above.halved(1, |place| place << (level - 2), spans(level, reach))?,
         };
         down.push(next);
     }
@@ -333,7 +365,7 @@ pub fn bloom_of(
     let mut newest = down.pop();
     for (index, own) in down.into_iter().enumerate().rev() {
         let Some(wider) = newest.take() else { break };
-        let kept = spans(&reaches[index][1]);
+        let kept = spans(index, &reaches[index][1]);
         let spread = match index {
             0 => wider.doubled(|place| (place + 1) / 2, kept)?,
             _ => wider.doubled(|place| place << (index - 1), kept)?,

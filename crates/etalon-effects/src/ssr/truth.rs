@@ -24,6 +24,11 @@
 //! behind reflect nothing, nor do rays that project onto half a texel or less.
 //!
 //! `resolution`, `search`, `steps`, `march_limit` and `storage` do not enter.
+//!
+//! A slope is a stair of cells in such an image, and its steps can be hit: a ray
+//! toward the eye may be behind a cell's surface where it enters the cell, and
+//! before it again at the cell's middle, where the effect looks. That is the
+//! truth about the screen; what the scene would say is another question.
 
 use glam::{DVec2, DVec3, DVec4, Vec4Swizzles as _};
 

@@ -105,6 +105,64 @@ fn loads_of_every_format_are_the_codec_inside_and_zero_outside() {
     }
 }
 
+/// Blocks of lanes that read rows, every other texel, texels twice and texels in any
+/// order, wholly inside; and with some outside.
+#[test]
+fn loads_along_rows_and_in_any_order_are_the_codec() {
+    type Place = fn(u32, u32) -> [u32; 2];
+    let places: [(&str, Place); 6] = [
+        ("id.xy", |x, y| [x, y]),
+        ("id.xy * 2u", |x, y| [2 * x, 2 * y]),
+        ("id.xy * 2u + 1u", |x, y| [2 * x + 1, 2 * y + 1]),
+        ("(id.xy + 1u) / 2u", |x, y| [x.div_ceil(2), y.div_ceil(2)]),
+        ("(id.xy * vec2<u32>(7u, 5u)) % 32u", |x, y| {
+            [x * 7 % 32, y * 5 % 32]
+        }),
+        ("id.yx * 3u", |x, y| [y * 3, x * 3]),
+    ];
+    for format in [
+        Format::Rgba16Float,
+        Format::Rgba8Unorm,
+        Format::R32Float,
+        Format::Rg16Float,
+    ] {
+        let image = noise(TextureDesc::d2(32, 32, format));
+        let texture = texture(&image);
+        for (at, place) in places {
+            for (channels, count) in [("texel", 4), ("vec4<f32>(texel.xyz, 7.0)", 3)] {
+                let program = program(&format!(
+                    "@group(0) @binding(0) var t: texture_2d<f32>;
+                     @group(0) @binding(1) var<storage, read_write> result: array<vec4<u32>>;
+                     @compute @workgroup_size(8, 8)
+                     fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+                         let texel = textureLoad(t, {at}, 0);
+                         result[id.y * 16u + id.x] = bitcast<vec4<u32>>({channels});
+                     }}"
+                ));
+                for (name, executor) in executors() {
+                    let result = buffer(&vec![0; 16 * 16 * 4]);
+                    let bound = [
+                        BoundResource::Texture(texture.view()),
+                        BoundResource::Buffer(&result),
+                    ];
+                    program.dispatch(&executor, [2, 2, 1], &bound).unwrap();
+                    for (i, got) in words(&result).chunks(4).enumerate() {
+                        let [x, y] = place(i as u32 % 16, i as u32 / 16);
+                        let want = image.texel(x, y, 0, 0).map_or([0; 4], bits);
+                        for (got, want) in got.iter().zip(want).take(count) {
+                            let nans = [*got, want].map(|bits| f32::from_bits(bits).is_nan());
+                            assert!(
+                                *got == want || nans == [true; 2],
+                                "{format}, {name}, {at}: {got:x} at {x},{y}, not {want:x}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn stores_of_every_storage_format_are_the_codec_and_skip_outside() {
     let formats = [

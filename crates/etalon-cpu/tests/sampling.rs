@@ -380,6 +380,58 @@ fn every_shape_filter_address_and_level_is_the_reference() {
     }
 }
 
+/// Where all lanes name one level by a literal, texels are read block by block; where
+/// each has a level of its own, they are not. The same bits, inside and outside.
+#[test]
+fn plain_bilinear_reads_are_those_of_the_general_way() {
+    let desc = shapes()[1].4;
+    let mut random = Random(11);
+    for format in [
+        Format::Rgba16Float,
+        Format::Rgba8Unorm,
+        Format::R32Float,
+        Format::Rg16Float,
+    ] {
+        let image = filled(desc.with_format(format), 3);
+        let texture = texture(&image);
+        for (lod, offset) in [(0.0_f32, ""), (1.0, ""), (0.0, ", vec2<i32>(3, -8)")] {
+            let sampled = |level: &str| {
+                let at = "vec2<f32>(d(0u), d(1u))";
+                let value = format!("textureSampleLevel(t, s, {at}, {level}{offset})");
+                kernel("texture_2d<f32>", "sampler", &value)
+            };
+            let (together, each) = (sampled(&format!("{lod:?}")), sampled("d(4u)"));
+            for address in [AddressMode::ClampToEdge, AddressMode::Repeat] {
+                let sampler = SamplerDesc {
+                    address: [address, AddressMode::ClampToEdge, address],
+                    ..SamplerDesc::LINEAR_CLAMP
+                };
+                let mut data = asks(&mut random, desc.mips);
+                for ask in data.chunks_mut(8) {
+                    ask[4] = lod;
+                }
+                // Far outside, and no number.
+                for (at, special) in [f32::INFINITY, -1e30, f32::NAN, -0.0]
+                    .into_iter()
+                    .enumerate()
+                {
+                    data[8 * at] = special;
+                }
+                let run = |program: &Program| {
+                    run(program, &texture, sampler, &data, COUNT, COUNT as usize * 4)
+                };
+                for (i, (got, want)) in run(&together).iter().zip(run(&each)).enumerate() {
+                    let nans = [*got, want].map(|bits| f32::from_bits(bits).is_nan());
+                    assert!(
+                        *got == want || nans == [true; 2],
+                        "{format}, level {lod}{offset}, {sampler:?}, {i}: {got:x}, not {want:x}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn the_reference_notices_a_wrong_mode() {
     // What the comparison above stands on: another address mode, filter or

@@ -49,6 +49,16 @@ const PAIRS: &[Pair] = &[
     pair("f32", "f32", "max(a, b)", "max(t, c)", "max3.f"),
     pair("f32", "f32", "a * b", "min(t, 65504.0)", "mulatmost.f"),
     pair("f32", "f32", "a + b", "max(t, 0.0)", "addatleast.f"),
+    pair("f32", "f32", "max(a + b, 0.0)", "min(t, 1.0)", "addclamp.f"),
+    pair(
+        "f32",
+        "f32",
+        "max(a + b, 0.0)",
+        "min(c, t)",
+        "limitaddatleast.f",
+    ),
+    pair("f32", "f32", "a * b * c", "max(t, 0.25)", "mul3atleast.f"),
+    pair("f32", "f32", "a * b + c", "d / t", "divbymuladd.f"),
     pair("f32", "f32", "a * b", "select(c, t, d < c)", "selectmul.f"),
     pair(
         "f32",
@@ -180,9 +190,24 @@ const PAIRS: &[Pair] = &[
     pair(
         "f32",
         "u32",
-        "select(bitcast<u32>(a), 0u, bitcast<u32>(a) > 0x7f800000u)",
+        "select(bitcast<u32>(a), 0u, bitcast<u32>(a) > 0x7f7fffffu)",
         "bitcast<f32>(min(t, 0x477fe000u))",
         "f.cap.f",
+    ),
+    // Limits of a number, though written on its bits.
+    pair(
+        "f32",
+        "u32",
+        "select(bitcast<u32>(a), 0u, bitcast<u32>(a) > 0x7f800000u)",
+        "bitcast<f32>(min(t, 0x477fe000u))",
+        "clamp.f",
+    ),
+    pair(
+        "f32",
+        "u32",
+        "select(bitcast<u32>(a), 0u, bitcast<u32>(a) > 0x7f800000u)",
+        "bitcast<f32>(min(t, 0x7f800000u))",
+        "clamp.f",
     ),
 ];
 

@@ -1,6 +1,10 @@
 //! Handlers of texel loads and stores, and of texture queries.
 
-use super::isa::Isa;
+use std::marker::PhantomData;
+
+use super::formats::{BlockFormat, WithFormat, with_format};
+use super::isa::{Baseline, Isa};
+use super::lanes::BLOCK;
 use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
@@ -129,6 +133,54 @@ pub(super) fn wanted(inst: &CodeInst) -> [bool; 4] {
     std::array::from_fn(|channel| inst.results.get(channel).is_some_and(Option::is_some))
 }
 
+/// The texels that an instruction's operands name in one level, by block.
+#[derive(Clone, Copy)]
+struct Addresses {
+    level: Level,
+    x: Slot,
+    y: Slot,
+    z: Option<Slot>,
+}
+
+impl Addresses {
+    /// If all lanes are at one level, which is there.
+    #[inline(always)]
+    fn new<N: Number>(
+        state: &State<'_, N>,
+        texture: &TextureView<'_>,
+        access: ImageAccess,
+        operands: &[Slot],
+        level: Option<Slot>,
+    ) -> Option<Self> {
+        let level = match level {
+            Some(level) if level.varying => return None,
+            Some(level) => state.ints::<1>(level, 0)[0],
+            None => 0,
+        };
+        let third = access.coordinates == 3 || access.layered;
+        Some(Self {
+            level: *texture.levels.get(level as usize)?,
+            x: *operands.first()?,
+            y: *operands.get(1)?,
+            z: if third { Some(*operands.get(2)?) } else { None },
+        })
+    }
+
+    #[inline(always)]
+    fn block<N: Number>(&self, state: &State<'_, N>, chunk: usize, block: usize) -> [u32; BLOCK] {
+        let mut index = [OUTSIDE; BLOCK];
+        let x = state.int_block(self.x, chunk, block);
+        let y = state.int_block(self.y, chunk, block);
+        if let Some(z) = self.z {
+            let z = state.int_block(z, chunk, block);
+            locate(self.level, &x, &y, Some(&z), &mut index);
+        } else {
+            locate(self.level, &x, &y, None, &mut index);
+        }
+        index
+    }
+}
+
 struct Load<const K: usize>;
 
 impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
@@ -146,10 +198,19 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
         } else {
             None
         };
+        let wide = if N::WIDE { texture.wide } else { None };
+        if K == LANES
+            && wide.is_none()
+            && let Some(addresses) = Addresses::new(state, texture, access, &inst.operands, level)
+        {
+            let load = LoadBlocks::<N, I>::new(state, texture, addresses, inst);
+            if with_format(texture, load).is_none() {
+                return;
+            }
+        }
         let wanted = wanted(inst);
         for chunk in 0..rounds::<N, K>(state) {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
-            let wide = if N::WIDE { texture.wide } else { None };
             if let (Some(wide), false) = (wide, N::HAS_SINGLE) {
                 wide::load::<I, N, K>(state, inst, wide, &index, &[[0; K]; 4], chunk);
                 continue;
@@ -165,6 +226,84 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
                     state.set_bits(to, chunk, channel);
                 }
             }
+        }
+    }
+}
+
+/// A load of lanes from a texture whose format is decoded by block.
+struct LoadBlocks<'s, 'a, N: Number, I> {
+    state: &'s mut State<'a, N>,
+    texture: &'a TextureView<'a>,
+    addresses: Addresses,
+    results: [Option<Slot>; 4],
+    isa: PhantomData<I>,
+}
+
+impl<'s, 'a, N: Number, I: Isa> LoadBlocks<'s, 'a, N, I> {
+    #[inline(always)]
+    fn new(
+        state: &'s mut State<'a, N>,
+        texture: &'a TextureView<'a>,
+        addresses: Addresses,
+        inst: &CodeInst,
+    ) -> Self {
+        let mut results = [None; 4];
+        for (to, result) in results.iter_mut().zip(&inst.results) {
+            *to = *result;
+        }
+        Self {
+            state,
+            texture,
+            addresses,
+            results,
+            isa: PhantomData,
+        }
+    }
+}
+
+impl<N: Number, I: Isa> WithFormat for LoadBlocks<'_, '_, N, I> {
+    #[inline(always)]
+    fn run<F: BlockFormat>(self, words: &[F::Word]) {
+        let Self {
+            state,
+            texture,
+            addresses,
+            results,
+            ..
+        } = self;
+        for chunk in 0..state.chunks {
+            for block in 0..LANES / BLOCK {
+                let index = addresses.block(state, chunk, block);
+                let Some(channels) = F::read::<I>(words, index, results[3].is_some()) else {
+                    load_outside(state, texture, &index, &results, chunk, block);
+                    continue;
+                };
+                for c in 0..4 {
+                    if let Some(to) = results[c] {
+                        state.set_single_block(to, chunk, block, channels[c]);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Loads a block of texels of which some are outside: seldom, so not in the loop, and
+/// as every processor can.
+#[inline(never)]
+fn load_outside<N: Number>(
+    state: &mut State<'_, N>,
+    texture: &TextureView<'_>,
+    index: &[u32; BLOCK],
+    results: &[Option<Slot>; 4],
+    chunk: usize,
+    block: usize,
+) {
+    let mut channels = [[0; BLOCK]; 4];
+    fetch::<Baseline, BLOCK>(texture, index, [true; 4], &mut channels);
+    for (result, channel) in results.iter().zip(channels) {
+        if let Some(to) = *result {
+            state.set_single_block(to, chunk, block, channel.map(f32::from_bits));
         }
     }
 }
@@ -195,7 +334,7 @@ impl<N: Number> TieredStep<N> for Store {
             for (channel, value) in channels.iter_mut().zip(value) {
                 *channel = state.bits(*value, chunk);
             }
-            put::<I>(texture, &index, &channels);
+            put::<I, LANES>(texture, &index, &channels);
             if let (true, Some(wide)) = (N::WIDE, texture.wide) {
                 wide::store::<I, N>(state, wide, texture.desc().format, &index, value, chunk);
             }

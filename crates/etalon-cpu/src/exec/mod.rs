@@ -11,6 +11,8 @@
 mod arith;
 mod check;
 mod dispatch;
+#[allow(unsafe_code)]
+mod formats;
 mod fused;
 mod half;
 mod image;

@@ -6,7 +6,7 @@ use super::check::Checker;
 use crate::code::{Code, CodeInst, Slot};
 use crate::memory::{Buffer, TextureView};
 use crate::num::Number;
-use crate::registers::{Class, LANES, Lanes, Registers};
+use crate::registers::{BLOCK, Class, LANES, Lane, Lanes, Registers};
 
 /// Something bound.
 #[derive(Clone, Copy, Debug)]
@@ -204,6 +204,50 @@ impl<'a, N: Number> State<'a, N> {
             out = [self.registers.uniform_floats[usize::from(slot.number)].to_f32(); K];
         }
         out
+    }
+
+    /// A block of [`State::ints`].
+    #[inline(always)]
+    pub(crate) fn int_block(&self, slot: Slot, chunk: usize, block: usize) -> [u32; BLOCK] {
+        if slot.varying {
+            let lanes = &self.registers.ints[self.at(slot.number, chunk)];
+            u32::block(lanes, block * BLOCK)
+        } else {
+            self.registers.uniform_ints[usize::from(slot.number)].splat()
+        }
+    }
+
+    /// A block of [`State::singles`].
+    #[inline(always)]
+    pub(crate) fn single_block(&self, slot: Slot, chunk: usize, block: usize) -> [f32; BLOCK] {
+        let mut out = [0.0; BLOCK];
+        if slot.varying {
+            let lanes = &self.registers.floats[self.at(slot.number, chunk)];
+            let numbers = N::block(lanes, block * BLOCK);
+            for k in 0..BLOCK {
+                out[k] = N::of_block(&numbers, k).to_f32();
+            }
+        } else {
+            out = [self.registers.uniform_floats[usize::from(slot.number)].to_f32(); BLOCK];
+        }
+        out
+    }
+
+    /// Sets a block of a register of lanes.
+    #[inline(always)]
+    pub(crate) fn set_single_block(
+        &mut self,
+        slot: Slot,
+        chunk: usize,
+        block: usize,
+        values: [f32; BLOCK],
+    ) {
+        let at = self.at(slot.number, chunk);
+        let mut numbers = N::default().splat();
+        for k in 0..BLOCK {
+            N::set_in_block(&mut numbers, k, N::from_f32(values[k]));
+        }
+        N::set_block(&mut self.registers.floats[at], block * BLOCK, numbers);
     }
 
     /// The `f64` of the numbers of `K` lanes.

@@ -10,7 +10,6 @@ use super::isa::Isa;
 use super::lanes::BLOCK;
 use crate::memory::{Channels, Texels, TextureView, decode, encode, unorm8, unorm8_codes};
 use crate::num::f16_to_f32;
-use crate::registers::LANES;
 
 /// Stands for a texel outside: no texture has so many.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
@@ -207,13 +206,13 @@ fn fetch_halves<I: Isa, const K: usize>(
     for (block, index) in blocks.iter().enumerate() {
         // SAFETY: all indices were seen to be inside, and atomics are laid out
         // as what they hold.
-        let parts = unsafe { I::load_parts(texels.as_ptr().cast(), texels.len(), *index) };
+        let values =
+            unsafe { I::load_halves(texels.as_ptr().cast(), texels.len(), *index, wanted[3]) };
         // Decoding all takes less time than asking which are wanted.
         for channel in 0..4 {
-            let values = I::from_halves(parts[channel]);
             let to = &mut out[channel][block * BLOCK..][..BLOCK];
             for k in 0..BLOCK {
-                to[k] = values[k].to_bits();
+                to[k] = values[channel][k].to_bits();
             }
         }
     }
@@ -221,8 +220,12 @@ fn fetch_halves<I: Isa, const K: usize>(
 
 /// Writes texels of four binary16.
 #[inline(always)]
-fn put_halves<I: Isa>(texels: &[AtomicU64], index: &[u32; LANES], channels: &Channels<LANES>) {
-    let mut words = [0; LANES];
+fn put_halves<I: Isa, const K: usize>(
+    texels: &[AtomicU64],
+    index: &[u32; K],
+    channels: &Channels<K>,
+) {
+    let mut words = [0; K];
     let (to, _) = words.as_chunks_mut::<BLOCK>();
     for (block, to) in to.iter_mut().enumerate() {
         let mut parts = [[0; BLOCK]; 4];
@@ -235,7 +238,7 @@ fn put_halves<I: Isa>(texels: &[AtomicU64], index: &[u32; LANES], channels: &Cha
         }
         *to = I::join(parts);
     }
-    store8::<I, LANES>(texels, index, &words);
+    store8::<I, K>(texels, index, &words);
 }
 
 /// `$out[c] = $channel` for each channel that is wanted.
@@ -365,55 +368,55 @@ fn words<const K: usize>(texels: &Texels, index: &[u32; K]) -> [[u64; K]; 2] {
     }
 }
 
-/// Writes texels where the index is inside.
+/// Writes texels where the index is inside; `K` is a multiple of [`BLOCK`].
 #[inline(always)]
-pub(crate) fn put<I: Isa>(
+pub(crate) fn put<I: Isa, const K: usize>(
     texture: &TextureView<'_>,
-    index: &[u32; LANES],
-    channels: &Channels<LANES>,
+    index: &[u32; K],
+    channels: &Channels<K>,
 ) {
     let format = texture.desc().format;
     match (texture.texels, format) {
         (Texels::B8(texels), Format::Rgba16Float) => {
-            put_halves::<I>(texels, index, channels);
+            put_halves::<I, K>(texels, index, channels);
         }
         (Texels::B4(texels), Format::Rgba8Unorm) => {
-            let mut word = [0; LANES];
+            let mut word = [0; K];
             unorm8_codes(channels, &mut word);
-            store4::<I, LANES>(texels, index, &word);
+            store4::<I, K>(texels, index, &word);
         }
         (Texels::B4(texels), Format::R32Float | Format::R32Uint | Format::R32Sint) => {
-            store4::<I, LANES>(texels, index, &channels[0]);
+            store4::<I, K>(texels, index, &channels[0]);
         }
         _ => {
-            let mut words = [[0; LANES]; 2];
+            let mut words = [[0; K]; 2];
             encode(format, channels, &mut words);
             let [low, high] = words;
             match texture.texels {
                 Texels::B1(texels) => {
-                    let mut parts = [0; LANES];
-                    for k in 0..LANES {
+                    let mut parts = [0; K];
+                    for k in 0..K {
                         parts[k] = low[k] as u8;
                     }
                     store(texels, index, &parts);
                 }
                 Texels::B2(texels) => {
-                    let mut parts = [0; LANES];
-                    for k in 0..LANES {
+                    let mut parts = [0; K];
+                    for k in 0..K {
                         parts[k] = low[k] as u16;
                     }
                     store(texels, index, &parts);
                 }
                 Texels::B4(texels) => {
-                    let mut parts = [0; LANES];
-                    for k in 0..LANES {
+                    let mut parts = [0; K];
+                    for k in 0..K {
                         parts[k] = low[k] as u32;
                     }
-                    store4::<I, LANES>(texels, index, &parts);
+                    store4::<I, K>(texels, index, &parts);
                 }
-                Texels::B8(texels) => store8::<I, LANES>(texels, index, &low),
+                Texels::B8(texels) => store8::<I, K>(texels, index, &low),
                 Texels::B16(texels) => {
-                    for k in 0..LANES {
+                    for k in 0..K {
                         let at = index[k] as usize * 2;
                         if let Some([l, h]) = texels.get(at..at + 2) {
                             l.put(low[k]);

@@ -241,6 +241,10 @@ instructions! {
     Add3F "add3.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).add(c);
     MulAtMostF "mulatmost.f" (a: Float, b: Float, c: Float) -> Float = a.mul(b).at_most(c);
     AddAtLeastF "addatleast.f" (a: Float, b: Float, c: Float) -> Float = a.add(b).at_least(c);
+    AddClampF "addclamp.f" (a: Float, b: Float, c: Float, e: Float) -> Float = a.add(b).at_least(c).at_most(e);
+    LimitAddAtLeastF "limitaddatleast.f" (a: Float, b: Float, c: Float, e: Float) -> Float = e.at_most(a.add(b).at_least(c));
+    Mul3AtLeastF "mul3atleast.f" (a: Float, b: Float, c: Float, e: Float) -> Float = a.mul(b).mul(c).at_least(e);
+    DivByMulAddF "divbymuladd.f" (a: Float, b: Float, c: Float, e: Float) -> Float = e.div(a.mul(b).add(c));
     AtLeast2F "atleast2.f" (a: Float, b: Float, c: Float) -> Float = a.at_least(b).at_least(c);
     AddFloorF "addfloor.f" (a: Float, b: Float) -> Float = a.add(b).floor();
     AddFloorStepsF "addfloor.steps.f" (a: Float, b: Float) -> Float = a.add(b).floor_in_steps();
@@ -303,7 +307,7 @@ impl Arith {
     /// Cost in vector operations per 16 lanes, roughly: what if-conversion weighs.
     pub(crate) fn cost(self) -> u32 {
         match self {
-            Self::DivF | Self::SqrtF => 3,
+            Self::DivF | Self::DivByMulAddF | Self::SqrtF => 3,
             Self::RemF | Self::DivS | Self::DivU | Self::RemS | Self::RemU => 6,
             Self::ExpF | Self::Exp2F | Self::LogF | Self::Log2F | Self::SinF | Self::CosF => 10,
             Self::PowF => 20,

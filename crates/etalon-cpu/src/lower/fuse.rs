@@ -47,6 +47,8 @@ const RULES: &[Rule] = &{
         // Rounding to an integer, and how far that was.
         rule(AddF, FloorF, 0, AddFloorF),
         rule(MulAddF, FloorF, 0, MulAddFloorF),
+        // Quotients by a sum of products.
+        rule(MulAddF, DivF, 1, DivByMulAddF),
         rule(SubF, AbsF, 0, AbsSubF),
         rule(AbsSubF, LtF, 0, LtAbsSubF),
         // Limits.
@@ -56,6 +58,9 @@ const RULES: &[Rule] = &{
         rule(LeU, SelectF, 0, SelectLeU),
         rule(MulF, AtMostF, 0, MulAtMostF),
         rule(AddF, AtLeastF, 0, AddAtLeastF),
+        rule(AddAtLeastF, AtMostF, 0, AddClampF),
+        rule(AddAtLeastF, AtMostF, 1, LimitAddAtLeastF),
+        rule(Mul3F, AtLeastF, 0, Mul3AtLeastF),
         rule(MulF, SelectF, 1, SelectMulF),
         rule(MaxS, MinS, 1, ClampS),
         rule(MaxS, MinS, 0, ClampS),

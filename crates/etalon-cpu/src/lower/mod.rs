@@ -6,6 +6,7 @@ mod coalesce;
 mod flat;
 mod flatten;
 mod fuse;
+mod limits;
 mod liveness;
 mod numbers;
 mod uniform;
@@ -22,6 +23,7 @@ pub(crate) fn lower(mut tree: Tree, partial: bool) -> Flat {
     let mut flat = flatten::flatten(&tree, &uniformity, partial);
     numbers::compare_numbers(&mut flat);
     fuse::superinstructions(&mut flat);
+    limits::limit_numbers(&mut flat);
     coalesce::coalesce(&mut flat);
     flat
 }

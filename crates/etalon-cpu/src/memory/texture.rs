@@ -56,6 +56,12 @@ macro_rules! each {
     };
 }
 
+impl Texels {
+    pub(crate) fn words(&self) -> usize {
+        each!(self, words => words.len())
+    }
+}
+
 fn reserve<T>(count: usize, bytes: u64, make: impl FnMut() -> T) -> Result<Vec<T>, RunError> {
     let mut words = Vec::new();
     words

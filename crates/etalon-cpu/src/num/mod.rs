@@ -32,7 +32,9 @@ use crate::registers::Lane;
 /// a bit cast, packing or conversion to `f16` sees the bits of the nearest `f32`
 /// (in [`NumberType::Shadow`], of the `f32`), and a number made of bits is an
 /// `f32`. A kernel that rounds by operations on bits therefore rounds in every
-/// type, and one that takes numbers apart by them does so to `f32` accuracy.
+/// type, and one that takes numbers apart by them does so to `f32` accuracy. A
+/// guard that only limits the bits of a number limits that number instead, which
+/// keeps its digits.
 ///
 /// Filtered reads are `f32` in every type: coordinates, weights, and the texels,
 /// which are those in the format and not those of a wide plane.

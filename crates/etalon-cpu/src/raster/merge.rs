@@ -168,7 +168,7 @@ impl Merge<'_, '_> {
             blend(&state, format, &mut channels, &there);
         }
         if writes == [true; 4] {
-            put::<I>(target.view, &index, &channels);
+            put::<I, LANES>(target.view, &index, &channels);
         } else {
             put_some(target.view, &index, &channels, writes);
         }

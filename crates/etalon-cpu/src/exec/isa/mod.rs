@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicU32, AtomicU64};
 
 use super::lanes::BLOCK;
-use crate::num::{f16_to_f32, f32_to_f16};
+use crate::num::{Number, f16_to_f32, f32_to_f16};
 
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -72,6 +72,33 @@ pub(crate) unsafe trait Isa: 'static {
         Self::split(unsafe { Self::load8(words, count, index) })
     }
 
+    /// The four binary16 of the words at `index`, from the lowest on. The last may
+    /// be anything where it is not `wanted`.
+    ///
+    /// # Safety
+    /// As for [`Isa::load4`].
+    #[inline(always)]
+    unsafe fn load_halves(
+        words: *const u64,
+        count: usize,
+        index: [u32; BLOCK],
+        wanted: bool,
+    ) -> [[f32; BLOCK]; 4] {
+        // SAFETY: the caller's promise.
+        let [red, green, blue, alpha] = unsafe { Self::load_parts(words, count, index) };
+        let last = if wanted {
+            Self::from_halves(alpha)
+        } else {
+            [0.0; BLOCK]
+        };
+        [
+            Self::from_halves(red),
+            Self::from_halves(green),
+            Self::from_halves(blue),
+            last,
+        ]
+    }
+
     /// Writes the words at `index`; of the same ones, any.
     ///
     /// # Safety
@@ -94,6 +121,26 @@ pub(crate) unsafe trait Isa: 'static {
             // SAFETY: the caller's promise.
             unsafe { (*words.add(index[k] as usize).cast::<AtomicU64>()).store(bits[k], Relaxed) };
         }
+    }
+
+    /// Whether all of them are below `count`.
+    #[inline(always)]
+    fn all_below(index: [u32; BLOCK], count: u32) -> bool {
+        let mut beyond = 0;
+        for k in 0..BLOCK {
+            beyond |= crate::num::mask(index[k] >= count);
+        }
+        beyond == 0
+    }
+
+    /// Rounded to integers, down.
+    #[inline(always)]
+    fn floor(values: [f32; BLOCK]) -> [f32; BLOCK] {
+        let mut floors = [0.0; BLOCK];
+        for k in 0..BLOCK {
+            floors[k] = Number::floor_in_steps(values[k]);
+        }
+        floors
     }
 
     /// The values of binary16.
@@ -211,6 +258,70 @@ mod tests {
     }
 
     #[test]
+    fn floors_and_limits_are_those_of_the_scalar_way() {
+        fn check<I: Isa>() {
+            let special = [
+                0.0,
+                -0.0,
+                0.5,
+                -0.5,
+                1e-40,
+                -1e-40,
+                8_388_607.5,
+                -8_388_607.5,
+                8_388_609.0,
+                2.5e9,
+                -2.5e9,
+                f32::MAX,
+                f32::INFINITY,
+                f32::NEG_INFINITY,
+                -1.0,
+                0.999_999_94,
+            ];
+            let floors = I::floor(special);
+            for (floor, value) in floors.iter().zip(special) {
+                assert_eq!(floor.to_bits(), value.floor().to_bits(), "of {value}");
+            }
+            for at in 0..BLOCK {
+                let mut index = [6; BLOCK];
+                assert!(I::all_below(index, 7) && !I::all_below(index, 6));
+                for beyond in [7, 1 << 31, u32::MAX] {
+                    index[at] = beyond;
+                    assert!(!I::all_below(index, 7), "{beyond} at {at}");
+                }
+            }
+        }
+        for_each_tier!(check);
+    }
+
+    /// Every half as each of the four of a word, among ordinary ones and among its like.
+    #[test]
+    fn texels_of_halves_are_those_of_the_scalar_way() {
+        fn check<I: Isa>() {
+            const ORDINARY: u64 = 0x3c00_0000_b555_7bff;
+            for bits in 0..=u16::MAX {
+                let part = usize::from(bits % 4);
+                let shift = 16 * part as u32;
+                let odd = ORDINARY & !(0xffff << shift) | u64::from(bits) << shift;
+                let mut words = [ORDINARY; BLOCK];
+                words[usize::from(bits / 4 % 16)] = odd;
+                for words in [words, [odd; BLOCK]] {
+                    let index = std::array::from_fn(|k| k as u32);
+                    // SAFETY: all indices are below the count; the tier is there.
+                    let halves = unsafe { I::load_halves(words.as_ptr(), BLOCK, index, true) };
+                    for (part, values) in halves.iter().enumerate() {
+                        for (k, value) in values.iter().enumerate() {
+                            let expected = f16_to_f32((words[k] >> (16 * part)) as u32 & 0xffff);
+                            assert_eq!(value.to_bits(), expected.to_bits(), "{bits:x} in {part}");
+                        }
+                    }
+                }
+            }
+        }
+        for_each_tier!(check);
+    }
+
+    #[test]
     fn words_are_taken_apart_and_put_together() {
         fn check<I: Isa>() {
             let words: [u64; BLOCK] =
@@ -232,8 +343,10 @@ mod tests {
         fn check<I: Isa>() {
             const COUNT: usize = 67;
             let last = COUNT as u32 - 1;
-            let orders: [[u32; BLOCK]; 8] = [
+            let orders: [[u32; BLOCK]; 10] = [
                 std::array::from_fn(|k| k as u32),
+                std::array::from_fn(|k| 20 + k as u32 / 2),
+                std::array::from_fn(|k| (20 + k as u32 / 2).min(23)),
                 std::array::from_fn(|k| last - 15 + k as u32),
                 std::array::from_fn(|k| k as u32 * 2),
                 std::array::from_fn(|k| last - 30 + k as u32 * 2),
@@ -255,6 +368,13 @@ mod tests {
                     assert_eq!(I::load8(words8.as_ptr(), COUNT, index), eight);
                     let parts = I::load_parts(words8.as_ptr(), COUNT, index);
                     assert_eq!(parts, I::split(eight));
+                    let halves = I::load_halves(words8.as_ptr(), COUNT, index, true);
+                    for (values, part) in halves.iter().zip(parts) {
+                        assert_eq!(
+                            values.map(f32::to_bits),
+                            I::from_halves(part).map(f32::to_bits)
+                        );
+                    }
                     I::store4(to4.as_mut_ptr(), index, four);
                     I::store8(to8.as_mut_ptr(), index, eight);
                 }

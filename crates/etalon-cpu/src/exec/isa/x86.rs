@@ -92,6 +92,32 @@ unsafe impl Isa for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn load_halves(
+        words: *const u64,
+        count: usize,
+        index: [u32; BLOCK],
+        _: bool,
+    ) -> [[f32; BLOCK]; 4] {
+        // SAFETY: the instructions are there; the caller's promise.
+        unsafe {
+            let [low, high]: [__m256i; 2] = transmute(index);
+            let [r, g, b, a] = eight_halves(words, count, low);
+            let [r2, g2, b2, a2] = eight_halves(words, count, high);
+            transmute([[r, r2], [g, g2], [b, b2], [a, a2]])
+        }
+    }
+
+    #[inline(always)]
+    fn floor(values: [f32; BLOCK]) -> [f32; BLOCK] {
+        // SAFETY: the instructions are there, see the trait; the types are plain
+        // numbers of the same sizes.
+        unsafe {
+            let [low, high]: [__m256; 2] = transmute(values);
+            transmute([_mm256_floor_ps(low), _mm256_floor_ps(high)])
+        }
+    }
+
+    #[inline(always)]
     fn from_halves(bits: [u16; BLOCK]) -> [f32; BLOCK] {
         // SAFETY: the instructions are there, see the trait; the types are
         // plain numbers of the same sizes.
@@ -124,11 +150,20 @@ unsafe fn run(index: __m256i) -> Option<usize> {
     // SAFETY: the caller's promise.
     unsafe {
         let first = _mm256_broadcastd_epi32(_mm256_castsi256_si128(index));
-        let steps = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-        let is_run = _mm256_cmpeq_epi32(_mm256_add_epi32(first, steps), index);
+        let is_run = _mm256_cmpeq_epi32(_mm256_add_epi32(first, steps()), index);
         let first = _mm256_cvtsi256_si32(index) as u32 as usize;
         (_mm256_movemask_epi8(is_run) == -1).then_some(first)
     }
+}
+
+/// 0 to 7.
+///
+/// # Safety
+/// There is AVX2.
+#[inline(always)]
+unsafe fn steps() -> __m256i {
+    // SAFETY: the caller's promise.
+    unsafe { _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7) }
 }
 
 /// Of eight words of four 16-bit parts, the first two parts and the last two.
@@ -141,6 +176,46 @@ unsafe fn parts_of_run(words: *const u64) -> [__m256i; 2] {
     unsafe {
         let low = _mm256_loadu_si256(words.cast());
         let high = _mm256_loadu_si256(words.add(4).cast());
+        parts_of_words(low, high)
+    }
+}
+
+/// [`parts_of_run`] of every other word.
+///
+/// # Safety
+/// There is AVX2; the words are there, and the one after the last.
+#[inline(always)]
+unsafe fn parts_of_every_other(words: *const u64) -> [__m256i; 2] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let low = _mm256_unpacklo_epi64(distant_pairs(words), distant_pairs(words.add(2)));
+        let words = words.add(8);
+        let high = _mm256_unpacklo_epi64(distant_pairs(words), distant_pairs(words.add(2)));
+        parts_of_words(low, high)
+    }
+}
+
+/// Words 0 and 1, 4 and 5.
+///
+/// # Safety
+/// There is AVX2; the words are there.
+#[inline(always)]
+unsafe fn distant_pairs(words: *const u64) -> __m256i {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let near = _mm256_castsi128_si256(_mm_loadu_si128(words.cast()));
+        _mm256_inserti128_si256::<1>(near, _mm_loadu_si128(words.add(4).cast()))
+    }
+}
+
+/// Of eight words, the first two parts and the last two.
+///
+/// # Safety
+/// There is AVX2.
+#[inline(always)]
+unsafe fn parts_of_words(low: __m256i, high: __m256i) -> [__m256i; 2] {
+    // SAFETY: the caller's promise.
+    unsafe {
         // Of words 0, 4, 1, 5 in the lower half and 2, 6, 3, 7 in the upper one,
         // two of a part next to each other; then four.
         let even = _mm256_unpacklo_epi16(low, high);
@@ -149,6 +224,83 @@ unsafe fn parts_of_run(words: *const u64) -> [__m256i; 2] {
         [
             _mm256_permutevar8x32_epi32(_mm256_unpacklo_epi16(even, odd), order),
             _mm256_permutevar8x32_epi32(_mm256_unpackhi_epi16(even, odd), order),
+        ]
+    }
+}
+
+/// The four binary16 of the words at eight indices: mostly of one row of a texture,
+/// next to each other, every other one where it is halved, or some of them twice
+/// where it is doubled.
+///
+/// # Safety
+/// As for [`Isa::load8`], where there are AVX2 and F16C.
+#[inline(always)]
+unsafe fn eight_halves(words: *const u64, count: usize, index: __m256i) -> [__m256; 4] {
+    // SAFETY: the caller's promise. What is read beyond the last index was seen to
+    // be there.
+    unsafe {
+        let from = _mm256_broadcastd_epi32(_mm256_castsi256_si128(index));
+        let first = _mm256_cvtsi256_si32(index) as u32 as usize;
+        let beyond = _mm256_sub_epi32(index, from);
+        let single = _mm256_cmpeq_epi32(beyond, steps());
+        let double = _mm256_cmpeq_epi32(beyond, _mm256_add_epi32(steps(), steps()));
+        if _mm256_movemask_epi8(single) == -1 {
+            halves_of_parts(parts_of_run(words.add(first)))
+        } else if first + 16 > count {
+            halves_of_any(words, index)
+        } else if _mm256_movemask_epi8(double) == -1 {
+            halves_of_parts(parts_of_every_other(words.add(first)))
+        } else if _mm256_testz_si256(beyond, _mm256_set1_epi32(!7)) == 1 {
+            let [r, g, b, a] = halves_of_parts(parts_of_run(words.add(first)));
+            [
+                _mm256_permutevar8x32_ps(r, beyond),
+                _mm256_permutevar8x32_ps(g, beyond),
+                _mm256_permutevar8x32_ps(b, beyond),
+                _mm256_permutevar8x32_ps(a, beyond),
+            ]
+        } else {
+            halves_of_any(words, index)
+        }
+    }
+}
+
+/// The values of four binary16 each, by [`parts_of_run`].
+///
+/// # Safety
+/// There are AVX2 and F16C.
+#[inline(always)]
+unsafe fn halves_of_parts(parts: [__m256i; 2]) -> [__m256; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let [red_green, blue_alpha] = parts;
+        [
+            _mm256_cvtph_ps(_mm256_castsi256_si128(red_green)),
+            _mm256_cvtph_ps(_mm256_extracti128_si256::<1>(red_green)),
+            _mm256_cvtph_ps(_mm256_castsi256_si128(blue_alpha)),
+            _mm256_cvtph_ps(_mm256_extracti128_si256::<1>(blue_alpha)),
+        ]
+    }
+}
+
+/// The four binary16 of the words at any eight indices.
+///
+/// # Safety
+/// As for [`Isa::load8`], where there are AVX2 and F16C.
+#[inline(always)]
+unsafe fn halves_of_any(words: *const u64, index: __m256i) -> [__m256; 4] {
+    // SAFETY: the caller's promise; the types are plain numbers of the same sizes.
+    unsafe {
+        let index: [u32; RUN] = transmute(index);
+        let mut pairs = [_mm_setzero_si128(); RUN / 2];
+        for k in 0..RUN / 2 {
+            pairs[k] = load_pair(words, index[2 * k], index[2 * k + 1]);
+        }
+        let [r, g, b, a] = parts_of_pairs(pairs);
+        [
+            _mm256_cvtph_ps(r),
+            _mm256_cvtph_ps(g),
+            _mm256_cvtph_ps(b),
+            _mm256_cvtph_ps(a),
         ]
     }
 }
@@ -180,12 +332,49 @@ unsafe impl Isa for Avx512 {
         }
     }
 
+    /// Mostly they are of two rows of a texture, next to each other: two loads and a
+    /// permutation for each then cost less than a gather.
     #[inline(always)]
     unsafe fn load8(words: *const u64, count: usize, index: [u32; BLOCK]) -> [u64; BLOCK] {
+        const NEAR: usize = 16;
         // SAFETY: as for AVX2, and the caller's promise.
         unsafe {
-            let [low, high]: [__m256i; 2] = transmute(index);
-            transmute([load_near(words, count, low), load_near(words, count, high)])
+            let lanes: __m512i = transmute(index);
+            let (first, second, from) = starts(lanes);
+            let beyond = _mm512_sub_epi32(lanes, from);
+            let far = _mm512_cmpge_epu32_mask(beyond, _mm512_set1_epi32(NEAR as i32));
+            let low = _mm512_castsi512_si256(beyond);
+            let high = _mm512_extracti64x4_epi64::<1>(beyond);
+            if far != 0 || first + NEAR > count || second + NEAR > count {
+                let [low, high]: [__m256i; 2] = transmute(lanes);
+                return transmute::<[__m512i; 2], [u64; BLOCK]>([
+                    _mm512_i32gather_epi64::<8>(low, words.cast()),
+                    _mm512_i32gather_epi64::<8>(high, words.cast()),
+                ]);
+            }
+            transmute([
+                load_window(words.add(first), low),
+                load_window(words.add(second), high),
+            ])
+        }
+    }
+
+    #[inline(always)]
+    fn all_below(index: [u32; BLOCK], count: u32) -> bool {
+        // SAFETY: as for AVX2.
+        unsafe {
+            let count = _mm512_set1_epi32(count as i32);
+            _mm512_cmpge_epu32_mask(transmute::<[u32; BLOCK], __m512i>(index), count) == 0
+        }
+    }
+
+    #[inline(always)]
+    fn floor(values: [f32; BLOCK]) -> [f32; BLOCK] {
+        const DOWN: i32 = _MM_FROUND_TO_NEG_INF;
+        // SAFETY: as for AVX2.
+        unsafe {
+            let values: __m512 = transmute(values);
+            transmute(_mm512_roundscale_ps::<DOWN>(values))
         }
     }
 
@@ -322,26 +511,17 @@ unsafe fn runs(index: [u32; BLOCK]) -> Option<(usize, usize)> {
     }
 }
 
-/// Words at eight indices. Mostly they are of one row of a texture, next to each
-/// other: two loads and a permutation then cost less than a gather.
+/// Eight of the sixteen words from an address on.
 ///
 /// # Safety
-/// As for [`Isa::load8`], where there is AVX-512.
+/// There is AVX-512; the words are there, and all of `at` are below 16.
 #[inline(always)]
-unsafe fn load_near(words: *const u64, count: usize, index: __m256i) -> __m512i {
-    const NEAR: usize = 16;
+unsafe fn load_window(words: *const u64, at: __m256i) -> __m512i {
     // SAFETY: the caller's promise.
     unsafe {
-        let first = _mm256_cvtsi256_si32(index) as u32;
-        let beyond = _mm256_sub_epi32(index, _mm256_set1_epi32(first as i32));
-        let far = _mm256_cmpge_epu32_mask(beyond, _mm256_set1_epi32(NEAR as i32));
-        if far != 0 || first as usize + NEAR > count {
-            return _mm512_i32gather_epi64::<8>(index, words.cast());
-        }
-        let base = words.add(first as usize);
-        let low = _mm512_loadu_si512(base.cast());
-        let high = _mm512_loadu_si512(base.add(NEAR / 2).cast());
-        _mm512_permutex2var_epi64(low, _mm512_cvtepu32_epi64(beyond), high)
+        let low = _mm512_loadu_si512(words.cast());
+        let high = _mm512_loadu_si512(words.add(8).cast());
+        _mm512_permutex2var_epi64(low, _mm512_cvtepu32_epi64(at), high)
     }
 }
 
@@ -355,12 +535,23 @@ unsafe fn load_pairs(words: *const u64, index: [u32; BLOCK]) -> [u64; BLOCK] {
     unsafe {
         let mut pairs = [_mm_setzero_si128(); BLOCK / 2];
         for k in 0..BLOCK / 2 {
-            let low = words.add(index[2 * k] as usize);
-            let high = words.add(index[2 * k + 1] as usize);
-            let pair = _mm_loadl_epi64(low.cast());
-            pairs[k] = _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(pair), high.cast()));
+            pairs[k] = load_pair(words, index[2 * k], index[2 * k + 1]);
         }
         transmute(pairs)
+    }
+}
+
+/// Two words.
+///
+/// # Safety
+/// As for [`Isa::load8`].
+#[inline(always)]
+unsafe fn load_pair(words: *const u64, low: u32, high: u32) -> __m128i {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let pair = _mm_loadl_epi64(words.add(low as usize).cast());
+        let high = words.add(high as usize).cast();
+        _mm_castpd_si128(_mm_loadh_pd(_mm_castsi128_pd(pair), high))
     }
 }
 
@@ -421,31 +612,43 @@ unsafe fn store_runs<T: Copy>(words: *mut T, index: [u32; BLOCK], bits: [T; BLOC
     }
 }
 
-/// Parts of words, by interleaving words with those two further, then what is
-/// next to each other.
+/// Parts of words, eight words at a time.
 #[inline(always)]
 fn split_by_unpacking(words: [u64; BLOCK]) -> [[u16; BLOCK]; 4] {
     // SAFETY: every x86-64 processor has SSE2; the types are plain numbers of
     // the same sizes.
     unsafe {
-        let pairs: [__m128i; BLOCK / 2] = transmute(words);
-        let mut parts = [[_mm_setzero_si128(); 2]; 4];
-        for half in 0..2 {
-            // Parts 0 and 1, and 2 and 3, of four words.
-            let mut fours = [[_mm_setzero_si128(); 2]; 2];
-            for four in 0..2 {
-                let (first, second) = (pairs[4 * half + 2 * four], pairs[4 * half + 2 * four + 1]);
-                let even = _mm_unpacklo_epi16(first, second);
-                let odd = _mm_unpackhi_epi16(first, second);
-                fours[four] = [_mm_unpacklo_epi16(even, odd), _mm_unpackhi_epi16(even, odd)];
-            }
-            let [near, far] = fours;
-            for two in 0..2 {
-                parts[2 * two][half] = _mm_unpacklo_epi64(near[two], far[two]);
-                parts[2 * two + 1][half] = _mm_unpackhi_epi64(near[two], far[two]);
-            }
+        let [first, second]: [[__m128i; RUN / 2]; 2] = transmute(words);
+        let [r, g, b, a] = parts_of_pairs(first);
+        let [r2, g2, b2, a2] = parts_of_pairs(second);
+        transmute([[r, r2], [g, g2], [b, b2], [a, a2]])
+    }
+}
+
+/// Parts of eight words, by interleaving words with those two further, then what is
+/// next to each other.
+///
+/// # Safety
+/// There is SSE2.
+#[inline(always)]
+unsafe fn parts_of_pairs(pairs: [__m128i; RUN / 2]) -> [__m128i; 4] {
+    // SAFETY: the caller's promise.
+    unsafe {
+        // Parts 0 and 1, and 2 and 3, of four words.
+        let mut fours = [[_mm_setzero_si128(); 2]; 2];
+        for four in 0..2 {
+            let (first, second) = (pairs[2 * four], pairs[2 * four + 1]);
+            let even = _mm_unpacklo_epi16(first, second);
+            let odd = _mm_unpackhi_epi16(first, second);
+            fours[four] = [_mm_unpacklo_epi16(even, odd), _mm_unpackhi_epi16(even, odd)];
         }
-        transmute(parts)
+        let [near, far] = fours;
+        [
+            _mm_unpacklo_epi64(near[0], far[0]),
+            _mm_unpackhi_epi64(near[0], far[0]),
+            _mm_unpacklo_epi64(near[1], far[1]),
+            _mm_unpackhi_epi64(near[1], far[1]),
+        ]
     }
 }
 

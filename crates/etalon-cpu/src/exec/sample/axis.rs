@@ -3,10 +3,12 @@
 
 use etalon_core::resource::AddressMode;
 
+use crate::exec::isa::Isa;
+use crate::exec::lanes::BLOCK;
 use crate::num::Number;
 
 /// Up to here positions of texels are exact in [`small_int`].
-const MAX_FAST_SIZE: u32 = 1 << 22;
+pub(super) const MAX_FAST_SIZE: u32 = 1 << 22;
 
 /// The texels that lanes read along an axis.
 pub(super) struct AxisTexels<const K: usize> {
@@ -31,20 +33,10 @@ impl<const K: usize> AxisTexels<K> {
         };
         let (floors, weight) = unnormalised(coordinate, &[size as f32; K], linear);
         result.weight = weight;
-        let [first, second] = &mut result.texels;
         if mode == AddressMode::ClampToEdge && size <= MAX_FAST_SIZE {
-            let last = size as i32 - 1;
-            let (low, high) = (-1.0, last as f32);
-            let offset = offset as f32;
-            for k in 0..K {
-                let floor = floors[k] + offset;
-                let floor = if floor > low { floor } else { low };
-                let floor = if floor < high { floor } else { high };
-                let at = small_int(floor);
-                first[k] = at.max(0) as u32;
-                second[k] = (at + 1).min(last) as u32;
-            }
+            result.texels = clamped(&floors, size, offset);
         } else {
+            let [first, second] = &mut result.texels;
             for k in 0..K {
                 let at = Number::to_i32(floors[k]).saturating_add(offset);
                 first[k] = wrap(mode, at, size);
@@ -53,6 +45,45 @@ impl<const K: usize> AxisTexels<K> {
         }
         result
     }
+}
+
+impl AxisTexels<BLOCK> {
+    /// What [`AxisTexels::new`] gives for a linear filter clamped to the edge, in the
+    /// instruction set's own way; for sizes up to [`MAX_FAST_SIZE`].
+    #[inline(always)]
+    pub(super) fn linear<I: Isa>(coordinate: &[f32; BLOCK], size: u32, offset: i32) -> Self {
+        let mut scaled = [0.0; BLOCK];
+        for k in 0..BLOCK {
+            scaled[k] = coordinate[k] * size as f32 - 0.5;
+        }
+        let floors = I::floor(scaled);
+        let mut weight = [0.0; BLOCK];
+        for k in 0..BLOCK {
+            weight[k] = scaled[k] - floors[k];
+        }
+        Self {
+            texels: clamped(&floors, size, offset),
+            weight,
+        }
+    }
+}
+
+/// Texels at whole positions and the ones after them, the edge repeated outside.
+#[inline(always)]
+fn clamped<const K: usize>(floors: &[f32; K], size: u32, offset: i32) -> [[u32; K]; 2] {
+    let mut texels = [[0; K]; 2];
+    let last = size as i32 - 1;
+    let (low, high) = (-1.0, last as f32);
+    let offset = offset as f32;
+    for k in 0..K {
+        let floor = floors[k] + offset;
+        let floor = if floor > low { floor } else { low };
+        let floor = if floor < high { floor } else { high };
+        let at = small_int(floor);
+        texels[0][k] = at.max(0) as u32;
+        texels[1][k] = (at + 1).min(last) as u32;
+    }
+    texels
 }
 
 /// Scales coordinates to texels: the whole part of the first texel's, and the
@@ -102,6 +133,7 @@ fn small_int(x: f32) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::exec::isa::Baseline;
 
     #[test]
     fn small_integers_are_exact() {
@@ -135,6 +167,13 @@ mod tests {
                 for linear in [false, true] {
                     let mode = AddressMode::ClampToEdge;
                     let fast = AxisTexels::new(mode, &coordinates, size, offset, linear);
+                    if linear {
+                        let block = AxisTexels::linear::<Baseline>(&coordinates, size, offset);
+                        assert_eq!(block.texels, fast.texels);
+                        let bits =
+                            [block.weight, fast.weight].map(|weight| weight.map(f32::to_bits));
+                        assert_eq!(bits[0], bits[1]);
+                    }
                     for (k, coordinate) in coordinates.into_iter().enumerate() {
                         let scaled = coordinate * size as f32 - if linear { 0.5 } else { 0.0 };
                         let at = (f64::from(scaled).floor() as i64).clamp(-1 << 40, 1 << 40)

@@ -6,6 +6,7 @@
 //! coordinates, sample operations), which WGSL §17.7 leaves to the API.
 
 mod axis;
+mod bilinear;
 mod cube;
 mod gather;
 mod general;
@@ -97,6 +98,13 @@ impl<N: Number, const K: usize> TieredStep<N> for Sample<K> {
         ) else {
             return;
         };
+        if K == LANES
+            && !sampling.clamp
+            && !sampling.gradient
+            && bilinear::sample::<I, N>(state, &request, &inst.operands, &inst.results)
+        {
+            return;
+        }
         for chunk in 0..rounds::<N, K>(state) {
             let (mut place, rest) = Place::<K>::read(state, &request, &inst.operands, chunk);
             if sampling.clamp {

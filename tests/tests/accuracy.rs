@@ -7,7 +7,7 @@ use etalon::effects::effect;
 use etalon_accuracy::executors::{Executor, Kind};
 use etalon_accuracy::model::Sweep;
 use etalon_accuracy::pictures::Pictures;
-use etalon_accuracy::sweep::{Options, Progress, sweep};
+use etalon_accuracy::sweep::{Options, Progress, Scenes, sweep};
 use etalon_scenes::FrameSize;
 use etalon_tests::required;
 
@@ -36,7 +36,7 @@ fn strict_errors_are_the_same_on_every_backend() {
         effects: ["ssr", "exposure", "bloom", "composite"]
             .map(|name| effect(name).unwrap())
             .to_vec(),
-        scenes: vec!["wet-floor".to_owned()],
+        scenes: Scenes::Named(vec!["wet-floor".to_owned()]),
         backends: backends.clone(),
         size: FrameSize::new(97, 55).unwrap(),
         depth: 1,

@@ -11,7 +11,7 @@ use etalon_accuracy::chart::{Chart, Place};
 use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
-use etalon_accuracy::sweep::{Options, Progress, sweep};
+use etalon_accuracy::sweep::{LEAST_FRAMES, Options, Progress, Scenes, sweep};
 use etalon_accuracy::{profile, report, store, table};
 use etalon_effects::{EffectEntry, effect, effects};
 use etalon_scenes::FrameSize;
@@ -24,7 +24,8 @@ struct Arguments {
     /// Effects; all that have a truth without it.
     #[arg(long, value_delimiter = ',')]
     effect: Vec<String>,
-    /// Scenes; for each effect those it is best judged on without it.
+    /// Scenes; for each effect the one it has most to do on without it, and all that
+    /// it is judged on with `all`.
     #[arg(long, value_delimiter = ',')]
     scene: Vec<String>,
     /// Backends.
@@ -40,7 +41,7 @@ struct Arguments {
     #[arg(long, default_value_t = 2)]
     depth: usize,
     /// Frames that each setting is timed for on each backend.
-    #[arg(long, default_value_t = 9)]
+    #[arg(long, default_value_t = 5)]
     frames: u32,
     /// Write a page with charts and pictures here. What is there of an earlier run
     /// is gone on with.
@@ -91,11 +92,15 @@ impl Arguments {
             .map_err(|_| format!("{minutes} minutes are no time that can be waited"))?;
         Ok(Options {
             effects: self.effects()?,
-            scenes: self.scene.clone(),
+            scenes: match self.scene.as_slice() {
+                [] => Scenes::First,
+                [all] if all == "all" => Scenes::Judged,
+                names => Scenes::Named(names.to_vec()),
+            },
             backends: self.backend.clone(),
             size: FrameSize::new(width, height).map_err(|error| error.to_string())?,
             depth: self.depth.min(8),
-            frames: self.frames.max(3),
+            frames: self.frames.max(LEAST_FRAMES),
             budget,
         })
     }

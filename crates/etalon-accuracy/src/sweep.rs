@@ -74,20 +74,31 @@ pub enum SweepError {
     Keep(String),
 }
 
+/// Which scenes effects are tried on.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Scenes {
+    /// Each effect on the one it has most to do on.
+    First,
+    /// Each effect on all that it is judged on.
+    Judged,
+    /// Every effect on these.
+    Named(Vec<String>),
+}
+
 /// What to sweep.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Effects; `chain` has no knobs of its own.
     pub effects: Vec<&'static EffectEntry>,
-    /// Scenes; for each effect those it is best judged on without any.
-    pub scenes: Vec<String>,
+    /// Scenes.
+    pub scenes: Scenes,
     /// Backends; each has to be there.
     pub backends: Vec<Kind>,
     /// Pixels of the pictures.
     pub size: FrameSize,
     /// How many knobs are turned at once.
     pub depth: usize,
-    /// Frames that each setting is timed for on each executor, at least 3.
+    /// Frames that each setting is timed for on each executor, at least [`LEAST_FRAMES`].
     pub frames: u32,
     /// Time for everything.
     pub budget: Duration,
@@ -105,6 +116,9 @@ pub trait Progress {
     /// A text, if it could not be kept; the sweep ends.
     fn keep(&mut self, sweep: &Sweep) -> Result<(), String>;
 }
+
+/// Frames that everything is timed for at least: quartiles of fewer would be none.
+pub const LEAST_FRAMES: u32 = 3;
 
 /// Points after which what was found is kept, should the sweep be stopped.
 const KEPT_EVERY: usize = 8;
@@ -145,14 +159,13 @@ pub fn sweep(
         .map_or(&[][..], |before| &before.subjects);
     let mut pairs = Vec::new();
     for &effect in &options.effects {
-        if options.scenes.is_empty() {
-            pairs.extend(
-                judge::scenes(effect.name)
-                    .iter()
-                    .map(|scene| (effect, *scene)),
-            );
-        } else {
-            pairs.extend(options.scenes.iter().map(|scene| (effect, scene.as_str())));
+        let judged = judge::scenes(effect.name);
+        match &options.scenes {
+            Scenes::First => pairs.extend(judged.iter().take(1).map(|scene| (effect, *scene))),
+            Scenes::Judged => pairs.extend(judged.iter().map(|scene| (effect, *scene))),
+            Scenes::Named(names) => {
+                pairs.extend(names.iter().map(|scene| (effect, scene.as_str())));
+            }
         }
     }
     let count = pairs.len();
@@ -215,7 +228,7 @@ impl Run<'_> {
             &candidates,
             judge.as_ref(),
             known,
-            begin + share / 2,
+            begin + share,
             &mut subject,
         )?;
         self.time(
@@ -273,6 +286,8 @@ impl Run<'_> {
         let what = format!("{} on {}: errors", subject.effect, subject.scene);
         self.progress.begin(&what, candidates.len());
         let mut exact = exact_backend()?;
+        // What timing all points once more takes, as far as one can tell from here.
+        let mut round = Duration::ZERO;
         for candidate in candidates {
             let found = known.and_then(|known| {
                 let mut points = known.points.iter();
@@ -290,7 +305,8 @@ impl Run<'_> {
                 self.progress.step();
                 continue;
             }
-            if Instant::now() > end && subject.points.len() >= 2 {
+            let rounds = round * (LEAST_FRAMES + 1);
+            if Instant::now() + rounds > end && subject.points.len() >= 2 {
                 self.notes.push(format!(
                     "{} on {}: {} of {} settings were left out for want of time, the most turned first",
                     subject.effect,
@@ -300,9 +316,10 @@ impl Run<'_> {
                 ));
                 break;
             }
-            let point = self
+            let (point, took) = self
                 .point(candidate, judge, &mut exact, subject)
                 .map_err(|source| self.error(&candidate.id, source))?;
+            round += took;
             subject.points.push(point);
             self.progress.step();
             if subject.points.len() % KEPT_EVERY == 0 {
@@ -320,7 +337,7 @@ impl Run<'_> {
         judge: &dyn Judge,
         exact: &mut CpuBackend,
         subject: &Subject,
-    ) -> Result<Point, JudgeError> {
+    ) -> Result<(Point, Duration), JudgeError> {
         let inputs = self.stage.frame.inputs();
         let plan = executors::plan(
             exact,
@@ -355,6 +372,7 @@ impl Run<'_> {
         };
         // Executors that wrote the same are judged once.
         let mut judged: Vec<(Observed, Judgement, [Option<String>; 2])> = Vec::new();
+        let mut took = Duration::ZERO;
         for executor in self.executors.iter_mut() {
             let plan = match executor.plan(
                 &candidate.graph,
@@ -371,7 +389,9 @@ impl Run<'_> {
                     continue;
                 }
             };
+            let start = Instant::now();
             let seen = Observed::of(executor.backend(), &plan, &inputs)?;
+            took += start.elapsed();
             if !judged.iter().any(|(known, ..)| *known == seen) {
                 let judgement = judge.judge(&seen, &reference)?;
                 let name = format!(
@@ -393,7 +413,7 @@ impl Run<'_> {
                 });
             }
         }
-        Ok(point)
+        Ok((point, took))
     }
 
     /// Times all points in turns, until `end` or until each has been timed often
@@ -447,8 +467,7 @@ impl Run<'_> {
         // The first round warms caches and clocks up and does not count.
         'rounds: for round in 0..=rounds {
             for item in &mut clocked {
-                // Quartiles of fewer than three would be none.
-                if Instant::now() > end && round > 3 {
+                if Instant::now() > end && round > LEAST_FRAMES as usize {
                     self.notes.push(format!(
                         "{} on {}: timed for {} frames instead of {rounds} for want of time",
                         subject.effect,

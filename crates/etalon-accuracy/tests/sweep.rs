@@ -8,7 +8,7 @@ use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{ErrorKind, Point, Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::store;
-use etalon_accuracy::sweep::{Options, Progress, SweepError, sweep};
+use etalon_accuracy::sweep::{Options, Progress, Scenes, SweepError, sweep};
 use etalon_effects::{effect, effects};
 use etalon_scenes::FrameSize;
 
@@ -36,7 +36,7 @@ impl Progress for Quiet {
 fn options(name: &str, depth: usize) -> Options {
     Options {
         effects: vec![effect(name).unwrap()],
-        scenes: Vec::new(),
+        scenes: Scenes::Judged,
         backends: vec![Kind::Cpu],
         size: FrameSize::new(160, 90).unwrap(),
         depth,
@@ -183,14 +183,14 @@ fn no_time_leaves_the_most_turned_out_and_says_so() {
 #[test]
 fn what_is_not_there_is_said() {
     let scene = Options {
-        scenes: vec!["nowhere".to_owned()],
+        scenes: Scenes::Named(vec!["nowhere".to_owned()]),
         ..options("ssr", 0)
     };
     let error = sweep(&scene, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
     assert!(error.to_string().contains("wet-floor"), "{error}");
     let chain = options("chain", 0);
     let chain = Options {
-        scenes: vec!["wet-floor".to_owned()],
+        scenes: Scenes::Named(vec!["wet-floor".to_owned()]),
         ..chain
     };
     let error = sweep(&chain, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();

@@ -236,6 +236,48 @@ fn nothing_in_a_sweep_becomes_markup() {
 }
 
 #[test]
+fn presets_are_held_against_settings_of_their_arithmetic() {
+    let point = |id: &str, preset: Option<&str>, arithmetic: &str, median, error| Point {
+        id: id.to_owned(),
+        preset: preset.map(str::to_owned),
+        arithmetic: arithmetic.to_owned(),
+        results: vec![Outcome {
+            executor: "cpu".to_owned(),
+            time: Some(Spread {
+                median,
+                lower: median,
+                upper: median,
+                frames: 1,
+            }),
+            errors: BTreeMap::from([("m".to_owned(), error)]),
+            ..Outcome::default()
+        }],
+        ..Point::default()
+    };
+    let mut sweep = unsound();
+    let subject = &mut sweep.subjects[0];
+    subject.points = vec![
+        point("a", Some("low"), "strict", 2e6, 0.5),
+        point("a-fast", Some("low"), "fast", 1e6, 0.5),
+        point("b", None, "strict", 3e6, 0.4),
+    ];
+    let good = report::render(&sweep);
+    assert!(good.contains("2 presets best for their time"), "{good}");
+    // Half the time and less error, in the same arithmetic.
+    sweep.subjects[0]
+        .points
+        .push(point("c", None, "strict", 1e6, 0.25));
+    let bad = report::render(&sweep);
+    assert!(bad.contains("1 of 2 presets dominated"), "{bad}");
+    assert!(
+        bad.contains(
+            "data-point=\"c\" data-executor=\"cpu\">c</a>: 50 % less time, 50 % less error"
+        ),
+        "{bad}"
+    );
+}
+
+#[test]
 fn an_empty_sweep_is_a_page() {
     let page = report::render(&Sweep::default());
     assert!(page.contains("There are no subjects."));

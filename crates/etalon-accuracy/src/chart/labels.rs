@@ -38,7 +38,15 @@ pub(super) const HEIGHT: f64 = 15.0;
 
 /// About how wide a name is drawn, in bold.
 pub(super) fn width(text: &str) -> f64 {
-    8.0 * text.chars().count() as f64
+    let of = |character: char| match character {
+        'i' | 'j' | 'l' | 'I' | '.' | ',' | ':' | ';' | '\'' | '|' | ' ' => 5.0,
+        'f' | 'r' | 't' | '(' | ')' | '-' | '/' | '"' => 6.5,
+        'm' | 'w' | 'M' | 'W' | '@' | '%' => 13.5,
+        'A'..='Z' | '_' => 10.0,
+        // Of most alphabets; of those that need more no width is known here.
+        _ => 9.0,
+    };
+    text.chars().map(of).sum()
 }
 
 /// Where to write names beside their points: of a few places around each, nearest

@@ -2,6 +2,10 @@
 //!
 //! Both axes are logarithmic: a setting that halves the error for twice the time is
 //! one step down and one to the right wherever it starts. Lower left is better.
+//!
+//! The Pareto front is drawn of each series by itself, `strict` and `fast`: which
+//! arithmetic to take is decided by other reasons than its time, and a setting that
+//! is only beaten by itself in other arithmetic is not a bad setting.
 
 mod labels;
 mod scale;

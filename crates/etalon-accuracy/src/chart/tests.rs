@@ -345,6 +345,26 @@ fn presets_are_named_the_default_is_ringed_and_the_front_is_a_line() {
 }
 
 #[test]
+fn a_series_is_not_beaten_by_another() {
+    let fast = |id: &str, time, error| Mark {
+        series: "fast".to_owned(),
+        ..mark(id, time, error)
+    };
+    let points = points(&chart(vec![
+        mark("strict", 2e6, 0.1),
+        mark("worse", 3e6, 0.1),
+        fast("fast", 1e6, 0.1),
+        fast("slow", 4e6, 0.2),
+    ]));
+    let on_front: Vec<&str> = points
+        .iter()
+        .filter(|point| point.get("class").unwrap().contains("on-front"))
+        .map(|point| point.get("data-point").unwrap())
+        .collect();
+    assert_eq!(on_front, ["fast", "strict"]);
+}
+
+#[test]
 fn what_is_better_the_larger_is_drawn_as_what_is_missing() {
     let metric = |unit: &str| Metric {
         id: "m".to_owned(),

@@ -24,8 +24,8 @@ use super::{MetricError, Sum, same_size};
 /// a picture smaller than them shows an eye nothing.
 pub const SMALLEST: u32 = 8;
 
-/// Most exposures that are looked at. Enough for steps of one stop over all that
-/// `f32` can hold of light; a wider range is looked at in wider steps.
+/// Most exposures that are looked at. Enough for steps of one stop over all normal
+/// numbers of `f32`; a wider range is looked at in wider steps.
 pub const MOST_EXPOSURES: u32 = 256;
 
 /// The error of each pixel.

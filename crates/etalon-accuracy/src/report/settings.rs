@@ -6,7 +6,7 @@ use super::html::things;
 use super::presets::{is_preset, name};
 use super::verdict::{Verdicts, first_metric, is_main, kind_name};
 use crate::chart::is_default;
-use crate::model::{Executor, Point, Subject, Sweep};
+use crate::model::{ErrorKind, Executor, Point, Subject, Sweep};
 use crate::text::{bytes, count, escape, number, time};
 
 /// A row for each point on each executor, to be sorted by any column.
@@ -175,7 +175,8 @@ fn cell(body: &mut String, class: &str, value: Option<f64>, text: &str) {
 }
 
 /// For each metric whether the point is best for its time, or dominated although it
-/// is a preset. The page shows that of the metric chosen.
+/// is a preset; not by rounding, which nobody turns a knob to lessen. The page shows
+/// that of the metric chosen.
 fn standing(
     body: &mut String,
     subject: &Subject,
@@ -195,7 +196,7 @@ fn standing(
             ("good", "best", String::new())
         } else if let Some(better) = standing
             .better
-            .filter(|_| is_preset(subject, point))
+            .filter(|_| is_preset(subject, point) && metric.kind != ErrorKind::Rounding)
             .and_then(|better| subject.points.get(better))
         {
             let how = verdicts.comparison(metric, &executor.id, point, better);

@@ -322,7 +322,7 @@ impl Run<'_> {
             round += took;
             subject.points.push(point);
             self.progress.step();
-            if subject.points.len() % KEPT_EVERY == 0 {
+            if subject.points.len().is_multiple_of(KEPT_EVERY) {
                 let mut sweep = self.done.clone();
                 sweep.subjects.push(subject.clone());
                 self.progress.keep(&sweep).map_err(SweepError::Keep)?;

@@ -7,9 +7,11 @@ use std::time::Duration;
 use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{ErrorKind, Point, Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
-use etalon_accuracy::store;
+use etalon_accuracy::profile::profile;
 use etalon_accuracy::sweep::{Options, Progress, Scenes, SweepError, sweep};
-use etalon_effects::{effect, effects};
+use etalon_accuracy::{store, table};
+use etalon_effects::budget::BudgetError;
+use etalon_effects::{ChainSettings, effect, effects};
 use etalon_scenes::FrameSize;
 
 /// Keeps nothing; stops after a number of steps, as a user might.
@@ -178,6 +180,49 @@ fn no_time_leaves_the_most_turned_out_and_says_so() {
         "{:?}",
         found.notes
     );
+}
+
+/// From what a sweep found settings can be picked: the most accurate for any time,
+/// cheaper ones for less.
+#[test]
+fn a_sweep_makes_a_profile_that_settings_are_picked_from() {
+    let all = Options {
+        effects: effects()
+            .iter()
+            .filter(|effect| effect.name != "chain")
+            .collect(),
+        scenes: Scenes::First,
+        size: FrameSize::new(97, 55).unwrap(),
+        ..options("ssr", 2)
+    };
+    let found = run(&all);
+    let profile = profile(&found, &found.executors[0]);
+    assert_eq!((profile.size, profile.effects.len()), ([97, 55], 4));
+    let picked = |budget| ChainSettings::full().for_budget(budget, &profile);
+    let most = picked(1e9).unwrap();
+    let bloom = found
+        .subjects
+        .iter()
+        .find(|subject| subject.effect == "bloom")
+        .unwrap();
+    let fast = bloom
+        .points
+        .iter()
+        .filter(|point| point.arithmetic == "fast");
+    let best = fast.min_by(|a, b| {
+        let [a, b] = [a, b].map(|point| error(point, "algorithm.colour"));
+        a.total_cmp(&b)
+    });
+    assert_eq!(
+        most.bloom.unwrap().levels.to_string(),
+        best.unwrap().settings["levels"]
+    );
+    assert_eq!(most.exposure.unwrap().stride, 1);
+    let Err(BudgetError::TooLittle { least, .. }) = picked(0.0) else {
+        panic!("nothing takes no time")
+    };
+    assert!(least > 0.0 && picked(least).is_ok());
+    assert!(table::text(&found).contains("bloom on dark-room-lights, cpu"));
 }
 
 #[test]

@@ -1,15 +1,13 @@
 //! What was found, as the library's users take it.
 
 use etalon_effects::budget::{DeviceProfile, EffectProfile, ProfilePoint};
+use etalon_effects::quality::tolerance;
 
-use crate::model::{Executor, Subject, Sweep};
+use crate::model::{ErrorKind, Executor, Subject, Sweep};
 
 /// The settings of every effect on one executor in fast arithmetic, which is what
-/// an engine runs, on the first scene of each effect.
-///
-/// The error is the relative mean square one against the exhaustive method;
-/// exposure's, which is in stops, is turned into it: a factor of 2^e on all light
-/// is a relative error of 2^e − 1.
+/// an engine runs, on the first scene of each effect. The error is the main one of
+/// the algorithm, in multiples of what is [tolerable](tolerance).
 #[must_use]
 pub fn profile(sweep: &Sweep, executor: &Executor) -> DeviceProfile {
     let mut effects: Vec<EffectProfile> = Vec::new();
@@ -33,13 +31,13 @@ fn points(subject: &Subject, executor: &str) -> Vec<ProfilePoint> {
         .points
         .iter()
         .filter(|point| point.arithmetic == "fast");
+    let mains = subject.mains();
+    let main = mains
+        .into_iter()
+        .find(|metric| metric.kind == ErrorKind::Algorithm);
     fast.filter_map(|point| {
-        let mut results = point.results.iter();
-        let result = results.find(|result| result.executor == executor)?;
-        let error = match result.errors.get("algorithm.colour") {
-            Some(error) => *error,
-            None => (result.errors.get("algorithm.ev")?.exp2() - 1.0).powi(2),
-        };
+        let result = point.on(executor)?;
+        let error = result.errors.get(&main?.id)? / tolerance(&subject.effect);
         Some(ProfilePoint {
             milliseconds: result.time?.median * 1e-6,
             error,

@@ -533,16 +533,17 @@ fn knob_model(knob: &KnobInfo) -> model::Knob {
 }
 
 /// What to say where rounding is no small part of the error: with the settings that
-/// are the default, on the first executor, by the main measures.
+/// are the default, on the first executor, by the main measure of rounding.
 fn rounding(subject: &Subject) -> Option<String> {
     let result = subject.points.first()?.results.first()?;
-    let of = |kind| {
-        let mains = subject.mains();
-        let main = mains.into_iter().find(|metric| metric.kind == kind)?;
-        result.errors.get(&main.id).copied()
-    };
-    let (rounding, algorithm) = (of(ErrorKind::Rounding)?, of(ErrorKind::Algorithm)?);
-    (rounding * 10.0 > algorithm).then(|| {
+    let mains = subject.mains();
+    let main = mains
+        .into_iter()
+        .find(|metric| metric.kind == ErrorKind::Rounding)?;
+    let (_, measure) = main.id.split_once('.')?;
+    let rounding = result.errors.get(&main.id)?;
+    let algorithm = result.errors.get(&format!("algorithm.{measure}"))?;
+    (rounding * 10.0 > *algorithm).then(|| {
         format!(
             "{} on {}: rounding ({rounding:.1e}) is not far below all that is left of the algorithm's error ({algorithm:.1e}) with the default settings",
             subject.effect, subject.scene

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use etalon_accuracy::executors::Kind;
-use etalon_accuracy::model::{ErrorKind, Point, Subject, Sweep};
+use etalon_accuracy::model::{Point, Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::profile::profile;
 use etalon_accuracy::sweep::{Options, Progress, Scenes, SweepError, sweep};
@@ -312,12 +312,9 @@ fn rounding_is_far_below_what_the_algorithm_leaves_out_or_it_is_said() {
         for subject in &found.subjects {
             let point = &subject.points[0];
             assert_eq!(point.id, "strict");
-            let main = |kind| {
-                let mains = subject.mains();
-                let main = mains.into_iter().find(|metric| metric.kind == kind);
-                error(point, &main.unwrap().id)
-            };
-            let [rounding, algorithm] = [ErrorKind::Rounding, ErrorKind::Algorithm].map(main);
+            let measure = if name == "exposure" { "ev" } else { "colour" };
+            let [rounding, algorithm] =
+                ["rounding", "algorithm"].map(|kind| error(point, &format!("{kind}.{measure}")));
             let what = format!("{name} on {}: {rounding} of {algorithm}", subject.scene);
             assert_eq!(rounding * 10.0 <= algorithm, small, "{what}");
             let said = |note: &String| note.contains("rounding") && note.contains(&subject.scene);

@@ -35,7 +35,9 @@ pub struct EffectProfile {
 pub struct ProfilePoint {
     /// What a frame takes, at least 0.
     pub milliseconds: f64,
-    /// Relative mean square error of the effect's result, at least 0.
+    /// Of the effect's result, in multiples of what is
+    /// [tolerable](crate::quality::tolerance), at least 0: so errors of different
+    /// effects can be added up.
     pub error: f64,
     /// Knobs and their values as text; the others are as they were.
     pub values: Vec<(String, String)>,

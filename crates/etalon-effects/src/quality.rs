@@ -7,15 +7,14 @@
 //! beats in operations, texel fetches, bytes and error,
 //!
 //! * `Ultra` is the cheapest within 5 % of the least error;
-//! * `Low` is the cheapest whose error is tolerable, in the mean over scenes: a
-//!   relative mean square error of 0.02 for reflections and 0.001 for bloom, which is
-//!   added to light that is right, and a tenth of a stop for exposure;
+//! * `Low` is the cheapest whose error, in the mean over scenes, is [`tolerance`];
 //! * `Medium` and `High` are the nearest to a third and two thirds of the way from
 //!   the one to the other, in the logarithm of operations; where bloom has too few
 //!   points for that, the next ones.
 //!
 //! A test sees to it that none is beaten. Presets set accuracy and leave the look
-//! alone; formats, which cost memory, as well.
+//! alone; formats, which cost memory, and the march's limit, which is a bound on the
+//! cost and counts in texels, as well.
 
 use std::fmt;
 
@@ -61,17 +60,17 @@ const PRESETS: &[(&str, [Values; 4])] = &[
         [
             &[
                 ("resolution", KnobValue::Real(0.125)),
-                ("steps", KnobValue::Count(3)),
+                ("steps", KnobValue::Count(8)),
             ],
             &[
                 ("resolution", KnobValue::Real(0.25)),
-                ("steps", KnobValue::Count(2)),
+                ("steps", KnobValue::Count(12)),
             ],
             &[
                 ("resolution", KnobValue::Real(0.5)),
-                ("steps", KnobValue::Count(1)),
+                ("steps", KnobValue::Count(12)),
             ],
-            &[("steps", KnobValue::Count(3))],
+            &[("steps", KnobValue::Count(8))],
         ],
     ),
     (
@@ -100,4 +99,18 @@ const PRESETS: &[(&str, [Values; 4])] = &[
 pub fn preset(effect: &str, quality: Quality) -> Values {
     let of_effect = PRESETS.iter().find(|(name, _)| *name == effect);
     of_effect.map_or(&[], |(_, presets)| presets[quality as usize])
+}
+
+/// How much of its main error an effect may have before it is seen without being
+/// looked for: of reflections an HDR-FLIP of 0.03, of bloom, which is added to light
+/// that is right, and of the composite a relative mean square error of 0.001, of
+/// exposure a tenth of a stop. 1 of what is no effect.
+#[must_use]
+pub fn tolerance(effect: &str) -> f64 {
+    match effect {
+        "ssr" => 0.03,
+        "bloom" | "composite" => 0.001,
+        "exposure" => 0.1,
+        _ => 1.0,
+    }
 }

@@ -144,6 +144,9 @@ impl Judge for Reflections {
             metrics.extend(colour_metrics(kind, Picturing::Light));
             metrics.extend(hit_metrics(kind));
         }
+        // What an eye sees comes first: a reflection that is missed altogether is
+        // forgiven by the relative error more than one that is moved a little.
+        metrics.sort_by_key(|metric| !metric.id.ends_with(".flip"));
         metrics.extend(hit_metrics(ErrorKind::Model));
         metrics
     }

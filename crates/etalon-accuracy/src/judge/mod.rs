@@ -1,8 +1,7 @@
 //! How effects are judged: which truths each is held against, and by what measure.
 //!
-//! The three kinds of error are kept apart throughout, see
-//! [`ErrorKind`](crate::model::ErrorKind). Truths are computed once for a scene; a
-//! judge then holds any number of settings to them.
+//! The three [kinds of error](ErrorKind) are kept apart throughout. Truths are computed
+//! once for a scene; a judge then holds any number of settings to them.
 
 mod light;
 mod ssr;

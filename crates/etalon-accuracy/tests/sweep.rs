@@ -10,7 +10,7 @@ use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::profile::profile;
 use etalon_accuracy::sweep::{Options, Progress, Scenes, SweepError, sweep};
 use etalon_accuracy::{store, table};
-use etalon_effects::budget::BudgetError;
+use etalon_effects::budget::{BudgetError, DeviceProfile};
 use etalon_effects::{ChainSettings, effect, effects};
 use etalon_scenes::FrameSize;
 
@@ -379,4 +379,16 @@ fn no_preset_is_beaten_in_work_and_error() {
             }
         }
     }
+}
+
+/// The profile that is kept of llvmpipe is one, and has a choice for its times.
+#[test]
+fn the_kept_profile_can_be_picked_from() {
+    let text = include_str!("../../../docs/measurements/llvmpipe.profile.json");
+    let profile: DeviceProfile = serde_json::from_str(text).unwrap();
+    assert_eq!(profile.size, [640, 360]);
+    let picked = |budget| ChainSettings::full().for_budget(budget, &profile);
+    let (little, much) = (picked(100.0).unwrap(), picked(400.0).unwrap());
+    assert!(little.ssr.unwrap().resolution < much.ssr.unwrap().resolution);
+    assert!(matches!(picked(10.0), Err(BudgetError::TooLittle { .. })));
 }

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 /// Text for HTML and SVG, in elements and in quoted attributes. Characters that XML
 /// cannot hold at all become U+FFFD.
-pub(crate) fn escape(text: &str) -> String {
+#[must_use]
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -2,11 +2,12 @@
 
 use std::fmt::Write;
 
+use etalon_accuracy::report::{escape, page};
+
 use super::model::{Case, ComparisonReport, Pictures, Report, Status};
 use super::table::{milliseconds, number, percent, total_time};
 use crate::compare::{Flip, Verdict};
 
-const PAGE: &str = include_str!("../report/page.html");
 const STYLE: &str = include_str!("../report/style.css");
 const SCRIPT: &str = include_str!("../report/script.js");
 
@@ -20,19 +21,7 @@ pub(super) fn render(report: &Report) -> String {
     for (number, case) in report.cases().into_iter().enumerate() {
         section(&mut body, report, case, number);
     }
-    // The body last: it may contain anything.
-    PAGE.replace("{{title}}", "Backends compared")
-        .replace("{{style}}", STYLE.trim_end())
-        .replace("{{script}}", SCRIPT.trim_end())
-        .replace("{{body}}", body.trim_end())
-}
-
-/// Text for HTML, in elements and in quoted attributes.
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
+    page("Backends compared", STYLE, SCRIPT, &body)
 }
 
 /// A list of messages, or nothing.

@@ -13,7 +13,6 @@ use super::{
     Judge, JudgeError, Judgement, Picturing, colour_figures, colour_metrics, metric, prefix,
 };
 use crate::metric::colour::energy;
-use crate::metric::exposure::stops;
 use crate::model::{ErrorKind, Metric};
 use crate::observe::Observed;
 use crate::pictures::Picture;
@@ -143,7 +142,9 @@ impl Judge for Metered {
             (ErrorKind::Model, self.model),
         ] {
             let id = format!("{}.ev", prefix(kind));
-            judgement.errors.insert(id, stops(found, truth)?.abs());
+            if let Some(stops) = exposure::truth::ev_between(found, truth) {
+                judgement.errors.insert(id, stops.abs());
+            }
         }
         Ok(judgement)
     }

@@ -5,7 +5,6 @@
 //! counted beside the measure, or the measure refuses.
 
 pub mod colour;
-pub mod exposure;
 pub mod flip;
 pub mod hits;
 mod quantile;
@@ -77,9 +76,6 @@ pub enum MetricError {
     /// The truth adds up to nothing, or to less, so no ratio to it exists.
     #[error("the truth adds up to {0}, of which nothing is a share")]
     NoEnergy(f64),
-    /// Something that has a logarithm only above 0.
-    #[error("{0} is not a positive finite number")]
-    NotPositive(f64),
     /// A share outside of 0 to 1.
     #[error("{0} is not a share from 0 to 1")]
     NotAShare(f64),

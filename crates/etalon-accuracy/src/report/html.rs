@@ -28,13 +28,18 @@ pub fn render(sweep: &Sweep) -> String {
     for (number, (subject, verdicts)) in sweep.subjects.iter().zip(&verdicts).enumerate() {
         subject::section(&mut body, sweep, subject, verdicts, number);
     }
+    let style = format!("{}\n{CHART_STYLE}", STYLE.trim_end());
+    page("What accuracy costs in time", &style, SCRIPT, &body)
+}
+
+/// A web page that needs nothing but itself: what reports of this project are put
+/// into. The title is text, the others are as they stand in the page.
+#[must_use]
+pub fn page(title: &str, style: &str, script: &str, body: &str) -> String {
     // The body last: it may contain anything.
-    PAGE.replace("{{title}}", "What accuracy costs in time")
-        .replace(
-            "{{style}}",
-            &format!("{}\n{}", STYLE.trim_end(), CHART_STYLE.trim_end()),
-        )
-        .replace("{{script}}", SCRIPT.trim_end())
+    PAGE.replace("{{title}}", &escape(title))
+        .replace("{{style}}", style.trim_end())
+        .replace("{{script}}", script.trim_end())
         .replace("{{body}}", body.trim_end())
 }
 

@@ -15,7 +15,9 @@ use crate::model::Sweep;
 use crate::store::{self, StoreError};
 
 pub use csv::csv;
-pub use html::render;
+pub use html::{page, render};
+
+pub use crate::text::escape;
 
 /// The page's name in the folder of a report.
 pub const PAGE: &str = "index.html";

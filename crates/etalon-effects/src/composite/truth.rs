@@ -15,6 +15,7 @@
 //! * T. Sobotka's AgX, 2022, in B. Wrensch's "Minimal AgX Implementation", 2023.
 //! * sRGB: IEC 61966-2-1.
 
+use etalon_core::texel::linear_to_srgb;
 use glam::{DMat3, DVec2, DVec3, Vec4Swizzles as _};
 
 use super::{Composite, Output, ToneCurve};
@@ -122,12 +123,7 @@ fn agx(colour: DVec3) -> DVec3 {
 /// sRGB's encoding of linear light limited to `[0, 1]`; 0 for NaN.
 #[must_use]
 pub fn srgb_encoded(linear: f64) -> f64 {
-    let x = unit_interval(linear);
-    if x <= 0.003_130_8 {
-        12.92 * x
-    } else {
-        1.055 * x.powf(1.0 / 2.4) - 0.055
-    }
+    linear_to_srgb(unit_interval(linear))
 }
 
 /// Texel `(x, y)` of a picture doubled in size: bilinear interpolation, smoothed

@@ -35,9 +35,12 @@ mod registers;
 pub mod semantics;
 
 mod report;
+pub mod sanitise;
 mod translate;
 
-pub use backend::{CpuBackend, CpuOptions, Findings, StepFinding, WideCapture, WideExecution};
+pub use backend::{
+    CpuBackend, CpuOptions, Findings, StepFinding, StepSanitised, WideCapture, WideExecution,
+};
 pub use binding::{BindingInfo, BindingKind, ChannelKind, View};
 pub use error::{Location, RunError, TranslateError};
 pub use exec::{Cost, DispatchCounters, Executor, Profile, ProfiledInstruction, Tier};

@@ -16,6 +16,7 @@ use crate::finding::{Checks, Finding};
 use crate::memory::{Buffer, TextureView, written};
 use crate::num::{Number, NumberType, Shadow};
 use crate::report::workgroup_id;
+use crate::sanitise::Sanitised;
 use crate::translate::{self, Fail};
 use crate::{exec, lower};
 
@@ -42,10 +43,16 @@ pub struct TranslateOptions {
     /// What the program watches for while it runs. Without checks there is no
     /// trace of them in its code.
     pub checks: Checks,
+    /// Whether the numerical [sanitiser](crate::sanitise) follows what it computes, in
+    /// executions of [`NumberType::Shadow`]. They take some ten times as long.
+    pub sanitise: bool,
+    /// Whether results can be moved within what WGSL allows, see
+    /// [`Executor::with_perturbation`].
+    pub perturb: bool,
 }
 
 /// What a dispatch did.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DispatchReport {
     /// How much was run.
     pub counters: DispatchCounters,
@@ -53,6 +60,8 @@ pub struct DispatchReport {
     /// order of the source. The same at any number of threads and lanes and on any
     /// instruction set.
     pub findings: Vec<Finding>,
+    /// What the sanitiser found; nothing unless [`TranslateOptions::sanitise`] was set.
+    pub sanitised: Sanitised,
 }
 
 /// The code linked to the handlers of a number type, by instruction set; each
@@ -325,6 +334,7 @@ impl Program {
     ) -> Result<DispatchReport, RunError> {
         let tier = executor.tier();
         let shadows = self.shadows(bound);
+        let heat = self.heat(workgroups);
         let job = exec::Job {
             code: &self.code,
             linked: linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier)),
@@ -333,13 +343,20 @@ impl Program {
             invocations: self.workgroup_size.iter().product(),
             recording: executor.profiles().then_some(&self.recording),
             shadows: &shadows,
+            heat: Some(&heat),
+            workgroup_size: self.workgroup_size,
         };
         let (counters, found) = job
             .run(executor, workgroups)
             .map_err(|failure| self.explain(failure, workgroups))?;
-        let findings = self.findings(found.finish(&shadows), workgroups);
+        let sanitised = self.sanitised(&found.tallies, &heat, workgroups);
+        let findings = self.findings(found.checks.finish(&shadows), workgroups);
         self.settle(&shadows, bound);
-        Ok(DispatchReport { counters, findings })
+        Ok(DispatchReport {
+            counters,
+            findings,
+            sanitised,
+        })
     }
 
     /// What its instructions have cost in dispatches by executors that

@@ -169,6 +169,11 @@ pub(crate) trait ClassOf<N: Number> {
     fn from_bits(bits: u32) -> Self::Lane;
     fn to_bits(lane: Self::Lane) -> u32;
 
+    /// Whichever of the two is of the class.
+    fn pick(number: N, int: u32) -> Self::Lane;
+    /// The lane as the one that it is, and the other zero.
+    fn parts(lane: Self::Lane) -> (N, u32);
+
     fn uniforms(registers: &mut Registers<N>) -> &mut Vec<Self::Lane>;
     fn file(registers: &mut Registers<N>) -> &mut Vec<<Self::Lane as Lane>::Lanes>;
 }
@@ -179,7 +184,7 @@ pub(crate) struct Float;
 pub(crate) struct Int;
 
 macro_rules! class {
-    ($class:ident, $lane:ty, $file:ident, $uniform:ident, $from:expr, $to:expr) => {
+    ($class:ident, $lane:ty, $file:ident, $uniform:ident, $from:expr, $to:expr, $pick:expr, $parts:expr) => {
         impl<N: Number> ClassOf<N> for $class {
             type Lane = $lane;
 
@@ -192,6 +197,16 @@ macro_rules! class {
             fn to_bits(lane: $lane) -> u32 {
                 let to: fn($lane) -> u32 = $to;
                 to(lane)
+            }
+            #[inline(always)]
+            fn pick(number: N, int: u32) -> $lane {
+                let pick: fn(N, u32) -> $lane = $pick;
+                pick(number, int)
+            }
+            #[inline(always)]
+            fn parts(lane: $lane) -> (N, u32) {
+                let parts: fn($lane) -> (N, u32) = $parts;
+                parts(lane)
             }
             #[inline(always)]
             fn uniforms(registers: &mut Registers<N>) -> &mut Vec<$lane> {
@@ -211,6 +226,17 @@ class!(
     floats,
     uniform_floats,
     |bits| N::from_f32(f32::from_bits(bits)),
-    |lane| lane.to_f32().to_bits()
+    |lane| lane.to_f32().to_bits(),
+    |number, _| number,
+    |lane| (lane, 0)
 );
-class!(Int, u32, ints, uniform_ints, |bits| bits, |lane| lane);
+class!(
+    Int,
+    u32,
+    ints,
+    uniform_ints,
+    |bits| bits,
+    |lane| lane,
+    |_, int| int,
+    |lane| (N::default(), lane)
+);

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::finding::Finding;
+use crate::sanitise::Sanitised;
 
 /// A finding and the step of the plan it is of.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -11,6 +12,17 @@ pub struct StepFinding {
     pub step: String,
     /// What was found.
     pub finding: Finding,
+}
+
+/// What the sanitiser found in a step of the plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepSanitised {
+    /// The step's name.
+    pub step: String,
+    /// The kernel's.
+    pub kernel: String,
+    /// What was found.
+    pub found: Sanitised,
 }
 
 impl fmt::Display for StepFinding {

@@ -16,7 +16,7 @@ use etalon_core::kernel::{Kernel, KernelId};
 use etalon_core::plan::Plan;
 use etalon_core::resource::Limits;
 
-pub use self::findings::{Findings, StepFinding};
+pub use self::findings::{Findings, StepFinding, StepSanitised};
 use self::histories::Histories;
 use self::pool::Pool;
 pub use self::wide::{WideCapture, WideExecution};
@@ -47,6 +47,14 @@ pub struct CpuOptions {
     /// reads that nothing wrote also means that no two textures or buffers of a
     /// plan share memory.
     pub checks: Checks,
+    /// Whether the [sanitiser](crate::sanitise) follows compute passes; what it finds is
+    /// in [`CpuBackend::take_sanitised`]. Kernels then compute in
+    /// [`NumberType::Shadow`] whatever `number_type` says, each from the `f32` that its
+    /// resources hold, so that results are bit by bit those of `f32`. Passes that draw
+    /// are not followed.
+    pub sanitise: bool,
+    /// See [`Executor::with_perturbation`]; of compute passes.
+    pub perturbation: Option<u64>,
 }
 
 impl Default for CpuOptions {
@@ -59,6 +67,8 @@ impl Default for CpuOptions {
             profile: false,
             number_type: NumberType::F32,
             checks: Checks::NONE,
+            sanitise: false,
+            perturbation: None,
         }
     }
 }
@@ -74,6 +84,9 @@ pub struct CpuBackend {
     counters: Counters,
     checks: Checks,
     findings: Findings,
+    sanitise: bool,
+    sanitised: Vec<StepSanitised>,
+    perturbs: bool,
 }
 
 impl CpuBackend {
@@ -93,17 +106,25 @@ impl CpuBackend {
         let executor = executor
             .with_max_trips(options.max_trips)
             .with_profile(options.profile)
-            .with_number_type(options.number_type)
+            .with_number_type(if options.sanitise {
+                NumberType::Shadow
+            } else {
+                options.number_type
+            })
+            .with_perturbation(options.perturbation)
             .with_tier(options.tier.unwrap_or_else(Tier::best));
         Ok(Self {
             executor,
             raster_programs: raster::RasterPrograms::default(),
             programs: HashMap::new(),
-            pool: Pool::new(options.number_type.is_wide()),
+            pool: Pool::new(options.number_type.is_wide() && !options.sanitise),
             histories: Histories::default(),
             counters: Counters::default(),
             checks: options.checks,
             findings: Findings::default(),
+            sanitise: options.sanitise,
+            sanitised: Vec::new(),
+            perturbs: options.perturbation.is_some(),
         })
     }
 
@@ -135,6 +156,12 @@ impl CpuBackend {
     /// What was found so far, which is forgotten.
     pub fn take_findings(&mut self) -> Findings {
         std::mem::take(&mut self.findings)
+    }
+
+    /// What the sanitiser found in the compute passes since this was last asked, in the
+    /// order in which they ran; it grows with every frame until then.
+    pub fn take_sanitised(&mut self) -> Vec<StepSanitised> {
+        std::mem::take(&mut self.sanitised)
     }
 
     /// The bytecode of a kernel, for reading; translated at most once.
@@ -176,6 +203,8 @@ impl CpuBackend {
         if let std::collections::hash_map::Entry::Vacant(entry) = self.programs.entry(kernel.id) {
             let options = TranslateOptions {
                 checks: self.checks,
+                sanitise: self.sanitise,
+                perturb: self.perturbs,
             };
             let program = Program::translate_with(kernel, &options).map_err(|error| {
                 BackendError::Kernel {

@@ -9,7 +9,7 @@ use etalon_core::plan::{Bound, Groups, Plan, Step};
 
 use super::histories::clear_texel;
 use super::resources::Resources;
-use super::{CpuBackend, WideCapture, malformed, step_error};
+use super::{CpuBackend, StepSanitised, WideCapture, malformed, step_error};
 use crate::binding::BindingInfo;
 use crate::error::RunError;
 use crate::memory::Buffer;
@@ -294,6 +294,13 @@ impl CpuBackend {
             .dispatch(&self.executor, groups, &bound)
             .map_err(|error| step_error(name, error))?;
         self.findings.add(name, report.findings);
+        if self.sanitise {
+            self.sanitised.push(StepSanitised {
+                step: name.to_owned(),
+                kernel: kernel.name.clone(),
+                found: report.sanitised,
+            });
+        }
         self.counters.dispatches += 1;
         Ok(())
     }

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::check::{Checker, Collector, Shadow};
 use super::link::Linked;
+use super::probe::{Heat, Prober, Tally};
 use super::profile::{Recorder, Recording, Unwatched, Watch};
 use super::state::{Failure, LocalIds, Resource, StageLanes, State};
 use super::subgroup::MAX_SUBGROUP;
@@ -26,6 +27,7 @@ pub struct Executor {
     max_trips: u32,
     profile: bool,
     subgroup_size: u32,
+    perturbation: Option<u64>,
 }
 
 /// What a dispatch did.
@@ -74,6 +76,7 @@ impl Executor {
             max_trips: Self::DEFAULT_MAX_TRIPS,
             profile: false,
             subgroup_size: Self::DEFAULT_SUBGROUP_SIZE,
+            perturbation: None,
         })
     }
 
@@ -139,6 +142,21 @@ impl Executor {
         self.subgroup_size
     }
 
+    /// Moves the results of programs translated with
+    /// [`TranslateOptions::perturb`](crate::TranslateOptions::perturb) within what WGSL
+    /// allows a device (§15.7.4): roundings go either way, sums of products may be fused,
+    /// subnormal numbers may be flushed to zero, functions are off by up to what their
+    /// accuracy says. Each seed is another such device; the same seed is the same one.
+    /// What several of them make of a picture says how much of it is not determined by
+    /// the kernel, as Verrou does for programs (F. Févotte and B. Lathuilière, 2016): it
+    /// is a sample, and no bound. Orders of summation are not changed. In `f32`; other
+    /// number types lose what they have beyond it.
+    #[must_use]
+    pub fn with_perturbation(mut self, seed: Option<u64>) -> Self {
+        self.perturbation = seed;
+        self
+    }
+
     /// The instruction set in use.
     #[must_use]
     pub fn tier(&self) -> Tier {
@@ -201,6 +219,10 @@ pub(crate) struct Job<'a, N: Number> {
     pub(crate) invocations: u32,
     /// What is known of the resources' contents, for checks.
     pub(crate) shadows: &'a [Shadow<'a>],
+    /// Where to mark what probes see; none for programs without.
+    pub(crate) heat: Option<&'a Heat>,
+    /// Invocations of a workgroup along each axis.
+    pub(crate) workgroup_size: [u32; 3],
     /// Where to record what instructions cost, if that is wanted.
     pub(crate) recording: Option<&'a Mutex<Recording>>,
 }
@@ -210,7 +232,7 @@ impl<'a, N: Number> Job<'a, N> {
         &self,
         executor: &Executor,
         workgroups: [u32; 3],
-    ) -> Result<(DispatchCounters, Collector), DispatchFailure> {
+    ) -> Result<(DispatchCounters, Found), DispatchFailure> {
         let total = workgroups
             .iter()
             .try_fold(1_u64, |total, &count| total.checked_mul(count.into()))
@@ -231,7 +253,7 @@ impl<'a, N: Number> Job<'a, N> {
             next: AtomicU64::new(0),
             failed: AtomicU64::new(u64::MAX),
             failure: Mutex::new(None),
-            found: Mutex::new(Collector::default()),
+            found: Mutex::new(Found::default()),
         };
         let work = || {
             let result = match self.recording {
@@ -303,8 +325,8 @@ impl<'a, N: Number> Job<'a, N> {
             // Workgroups before one that failed still run: which failure is
             // reported must not depend on the workers' speed.
             if first >= total.min(shared.failed.load(Ordering::Relaxed)) {
-                if let Some(checker) = state.and_then(|state| state.checker) {
-                    lock(&shared.found).append(checker.collector);
+                if let Some(state) = state {
+                    lock(&shared.found).append(state);
                 }
                 return Ok(());
             }
@@ -333,6 +355,9 @@ impl<'a, N: Number> Job<'a, N> {
                     state.first_chunk = chunk;
                     state.chunks = most.min(chunks - chunk);
                     chunk += state.chunks;
+                    if let Some(prober) = &mut state.prober {
+                        prober.begin();
+                    }
                     self.linked
                         .run(state, executor.max_trips, watch)
                         .map_err(|failure| {
@@ -390,6 +415,10 @@ impl<'a, N: Number> Job<'a, N> {
                 chunks,
             },
             checker: Checker::new(self.code, chunks, self.shadows),
+            prober: self
+                .heat
+                .and_then(|heat| Prober::new(self.code, chunks, self.workgroup_size, heat)),
+            perturbation: executor.perturbation,
         };
         for &(slot, bits) in &self.code.constants {
             state.set_bits(slot, 0, &[bits]);
@@ -410,7 +439,34 @@ struct Shared {
     /// The first workgroup that is known to have failed.
     failed: AtomicU64,
     failure: Mutex<Option<DispatchFailure>>,
-    found: Mutex<Collector>,
+    found: Mutex<Found>,
+}
+
+/// What the workers of a dispatch found.
+#[derive(Debug, Default)]
+pub(crate) struct Found {
+    pub(crate) checks: Collector,
+    /// By probe; none if the program has none, or nothing ran.
+    pub(crate) tallies: Vec<Tally>,
+}
+
+impl Found {
+    fn append<N: Number>(&mut self, state: State<'_, N>) {
+        if let Some(checker) = state.checker {
+            self.checks.append(checker.collector);
+        }
+        let tallies = state
+            .prober
+            .map(|prober| prober.tallies)
+            .unwrap_or_default();
+        if self.tallies.is_empty() {
+            self.tallies = tallies;
+        } else {
+            for (to, from) in self.tallies.iter_mut().zip(&tallies) {
+                to.append(from);
+            }
+        }
+    }
 }
 
 impl Shared {

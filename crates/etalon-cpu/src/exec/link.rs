@@ -5,7 +5,7 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{check, half, image, memory, sample, stage, subgroup, texel_atomic};
+use super::{check, half, image, memory, perturb, probe, sample, stage, subgroup, texel_atomic};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::{Input, Op};
 use crate::num::Number;
@@ -209,6 +209,8 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
         Op::Subgroup { .. } => Handler::plain::<subgroup::Subgroup>(),
         Op::Barrier => Handler::plain::<Barrier>(),
         Op::Check(_) => Handler::plain::<check::CheckStep>(),
+        Op::Probe(_) => Handler::plain::<probe::ProbeStep>(),
+        Op::Perturb(_) => Handler::plain::<perturb::Perturb>(),
     }
 }
 

@@ -46,6 +46,8 @@ impl<'a> Stage<'a> {
             local_ids,
             invocations: 0,
             shadows: &[],
+            heat: None,
+            workgroup_size: [0; 3],
             recording: None,
         };
         let state = job.state(executor, local_ids.active.len(), [1; 3]);

@@ -3,6 +3,7 @@
 use etalon_core::resource::SamplerDesc;
 
 use super::check::Checker;
+use super::probe::Prober;
 use crate::code::{Code, CodeInst, Slot};
 use crate::memory::{Buffer, TextureView};
 use crate::num::Number;
@@ -105,6 +106,10 @@ pub(crate) struct State<'a, N: Number> {
     pub(crate) stage: StageLanes,
     /// Of programs with checks.
     pub(crate) checker: Option<Box<Checker<'a>>>,
+    /// Of programs with probes.
+    pub(crate) prober: Option<Box<Prober<'a>>>,
+    /// See [`super::Executor::with_perturbation`].
+    pub(crate) perturbation: Option<u64>,
 }
 
 impl<'a, N: Number> State<'a, N> {

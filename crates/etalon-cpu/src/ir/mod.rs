@@ -8,12 +8,14 @@
 pub(crate) mod arith;
 mod check;
 mod op;
+mod probe;
 mod stage;
 pub(crate) mod subgroup;
 
 pub(crate) use arith::{Arith, Class};
 pub(crate) use check::{Access, Check, Indexed};
 pub(crate) use op::{AtomicFunction, ImageAccess, ImageQuery, Input, Memory, Op, Sampling};
+pub(crate) use probe::{Perturbed, Probe, Probed};
 pub(crate) use stage::{Interpolation, StageInput, StageOutput, StageSlots};
 
 use naga::Span;
@@ -145,6 +147,8 @@ pub(crate) struct Resources {
     pub(crate) workgroup: Slots,
     /// What the program watches for.
     pub(crate) checks: Checks,
+    /// What the sanitiser follows.
+    pub(crate) probes: Vec<Probe>,
     /// Of vertex and fragment kernels.
     pub(crate) stage: StageSlots,
 }

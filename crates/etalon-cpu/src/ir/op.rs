@@ -3,7 +3,7 @@
 use std::fmt;
 
 use super::subgroup::SubgroupFunction;
-use super::{Arith, Check, Class};
+use super::{Arith, Check, Class, Perturbed};
 
 /// What a kernel is told about its place in the dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -216,6 +216,10 @@ pub(crate) enum Op {
     Barrier,
     /// Looks for what a GPU hides.
     Check(Check),
+    /// Follows what rounding does: the number of a probe.
+    Probe(u32),
+    /// Moves a result within what WGSL allows.
+    Perturb(Perturbed),
 }
 
 impl Op {
@@ -226,6 +230,7 @@ impl Op {
             Self::BufferLoad { constant, .. } => constant,
             Self::ImageLoad { level, .. } => level,
             Self::Arith(_)
+            | Self::Perturb(_)
             | Self::Input(_)
             | Self::Table { .. }
             | Self::BufferLength { .. }
@@ -294,6 +299,7 @@ impl Op {
                 | Self::Subgroup { .. }
                 | Self::Barrier
                 | Self::Check(_)
+                | Self::Probe(_)
         )
     }
 
@@ -413,6 +419,8 @@ impl fmt::Display for Op {
             }
             Self::Barrier => f.write_str("barrier"),
             Self::Check(check) => check.fmt(f),
+            Self::Probe(site) => write!(f, "probe {site}"),
+            Self::Perturb(perturbed) => write!(f, "perturb {}", perturbed.op.mnemonic()),
         }
     }
 }

@@ -8,7 +8,10 @@ use naga::Span;
 
 use super::Fail;
 use crate::ir::arith::{Binary, ClassOf, Quaternary, Ternary, Unary, Visitor};
-use crate::ir::{Arith, Class, Inst, Node, Op, Origin, ScopeId, Tree, Value, ValueInfo, Variable};
+use crate::ir::{
+    Arith, Class, Inst, Node, Op, Origin, Perturbed, Probe, Probed, ScopeId, Tree, Value,
+    ValueInfo, Variable,
+};
 
 /// Most nodes in a program: inlining must not run away.
 const MAX_NODES: u64 = 1 << 19;
@@ -53,6 +56,8 @@ pub(super) struct Builder {
     constants: HashMap<(Class, u32), Value>,
     /// What computed each value.
     computed: HashMap<Value, (Arith, Vec<Value>)>,
+    /// What results became that were perturbed.
+    perturbed: HashMap<Value, Value>,
     /// The value each variable is known to have at this point.
     known: Vec<Option<Value>>,
     node_count: u64,
@@ -64,7 +69,18 @@ pub(super) struct Builder {
     /// 24 bits are at least twice the 11 of binary16 and two more, so the second
     /// rounding is never led astray by the first.
     pub(super) half: bool,
+    /// What is put beside arithmetic.
+    pub(super) instrument: Instrument,
     pub(super) span: Span,
+}
+
+/// What is put beside arithmetic.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Instrument {
+    /// Probes of the sanitiser.
+    pub(super) probes: bool,
+    /// Perturbations.
+    pub(super) perturbs: bool,
 }
 
 impl Builder {
@@ -75,10 +91,12 @@ impl Builder {
             prologue_numbering: HashMap::new(),
             constants: HashMap::new(),
             computed: HashMap::new(),
+            perturbed: HashMap::new(),
             known: Vec::new(),
             node_count: 0,
             left: BTreeSet::new(),
             half: false,
+            instrument: Instrument::default(),
             span: Span::default(),
         }
     }
@@ -174,9 +192,59 @@ impl Builder {
             let folded = op.visit::<f32, _>(Fold { bits: &bits });
             return self.constant(op.result(), folded);
         }
+        let known = self.tree.values.len();
         let value = self.op(Op::Arith(op), operands, &[op.result()])[0];
         self.computed.insert(value, (op, operands.to_vec()));
+        let is_new = self.tree.values.len() > known;
+        if is_new && self.instrument.probes && op.is_probed() {
+            let scalars: Vec<Value> = [value]
+                .into_iter()
+                .chain(operands.iter().copied())
+                .collect();
+            self.probe(Probed::Arith(op), &scalars);
+        }
+        if self.instrument.perturbs && op.result() == Class::Float && op.is_probed() {
+            return self.perturb(op, value, operands);
+        }
         value
+    }
+
+    /// Has the sanitiser follow something.
+    pub(super) fn probe(&mut self, probed: Probed, operands: &[Value]) {
+        let site = self.tree.resources.probes.len() as u32;
+        let span = self.span;
+        self.tree.resources.probes.push(Probe { probed, span });
+        self.op(Op::Probe(site), operands, &[]);
+    }
+
+    /// A result as a device might have computed it; the same for a result that is known.
+    fn perturb(&mut self, op: Arith, value: Value, operands: &[Value]) -> Value {
+        if op.chooses() || op.drops_digits() {
+            return value;
+        }
+        if let Some(&perturbed) = self.perturbed.get(&value) {
+            return perturbed;
+        }
+        let mut given: Vec<Value> = [value]
+            .into_iter()
+            .chain(operands.iter().copied())
+            .collect();
+        let mut product = None;
+        if matches!(op, Arith::AddF | Arith::SubF) {
+            for (at, operand) in (0..).zip(operands) {
+                if let Some((Arith::MulF, factors)) = self.computed.get(operand) {
+                    product = Some(at);
+                    given.extend(factors);
+                    break;
+                }
+            }
+        }
+        let site = self.perturbed.len() as u32;
+        let perturbed = Op::Perturb(Perturbed { op, site, product });
+        let result = self.op(perturbed, &given, &[Class::Float])[0];
+        self.computed.insert(result, (op, operands.to_vec()));
+        self.perturbed.insert(value, result);
+        result
     }
 
     /// Identities that hold for every operand, NaN and -0 included.

@@ -4,7 +4,7 @@ use naga::{Expression, Handle, ImageClass, SampleLevel, ScalarKind, TypeInner};
 
 use super::{Fail, Frame, Translator};
 use crate::binding::{BindingKind, ChannelKind, MULTISAMPLED, View};
-use crate::ir::{Access, Arith, Class, ImageAccess, ImageQuery, Op, Sampling, Value};
+use crate::ir::{Access, Arith, Class, ImageAccess, ImageQuery, Op, Probed, Sampling, Value};
 
 impl<'a> Translator<'a> {
     fn access(&self, image: u16, sampled: bool) -> Result<ImageAccess, Fail> {
@@ -140,8 +140,12 @@ impl<'a> Translator<'a> {
         let mut operands = self.coordinates(frame, access, coordinate, layer)?;
         let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
         self.check_texel(access, false, signed, Access::Write, &operands);
-        operands.extend(self.scalars(frame, value)?);
+        let channels = self.scalars(frame, value)?;
+        operands.extend(&channels);
         self.where_alive(|this| {
+            if this.builder.instrument.probes {
+                this.builder.probe(Probed::Texel(access), &channels);
+            }
             this.builder
                 .op(Op::ImageStore { access, class }, &operands, &[]);
         });

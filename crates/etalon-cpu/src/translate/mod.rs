@@ -143,6 +143,10 @@ pub(crate) fn translate_stage<'a>(
     translator.builder.tree.independent =
         !options.checks.any() && !scan::is_collective(module, info, entry_point);
     translator.builder.tree.resources.checks = options.checks;
+    translator.builder.instrument = builder::Instrument {
+        probes: options.sanitise,
+        perturbs: options.perturb,
+    };
     match translator.entry_point(entry_point, others) {
         Ok(()) => Ok(Translation {
             bindings: translator.bindings,

@@ -6,7 +6,7 @@ use naga::TypeInner;
 
 use super::layout::{Leaf, bytes, column_stride, fixed_length};
 use super::{Fail, Translator};
-use crate::ir::{Access, Arith, AtomicFunction, Class, Memory, Op, Slots, Value, Variable};
+use crate::ir::{Access, Arith, AtomicFunction, Class, Memory, Op, Probed, Slots, Value, Variable};
 
 /// Most memory slots of a class per invocation or workgroup.
 const MAX_SLOTS: u32 = 1 << 14;
@@ -436,6 +436,9 @@ impl<'a> Translator<'a> {
                     let offset = offset.saturating_add(leaf.offset) / 4;
                     let operands: Vec<Value> = [value].into_iter().chain(computed).collect();
                     self.where_alive(|this| {
+                        if this.builder.instrument.probes && class == Class::Float {
+                            this.builder.probe(Probed::Word, &[value]);
+                        }
                         this.builder.op(
                             Op::BufferStore {
                                 buffer,

@@ -19,6 +19,18 @@ pub(crate) fn translate(wgsl: &str) -> Result<Program, TranslateError> {
 
 /// [`translate`] with checks.
 pub(crate) fn translate_with(wgsl: &str, checks: Checks) -> Result<Program, TranslateError> {
+    let options = TranslateOptions {
+        checks,
+        ..TranslateOptions::default()
+    };
+    translate_as(wgsl, &options)
+}
+
+/// [`translate`] with options.
+pub(crate) fn translate_as(
+    wgsl: &str,
+    options: &TranslateOptions,
+) -> Result<Program, TranslateError> {
     let module = naga::front::wgsl::parse_str(wgsl)
         .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
     let info = naga::valid::Validator::new(
@@ -29,8 +41,7 @@ pub(crate) fn translate_with(wgsl: &str, checks: Checks) -> Result<Program, Tran
     .subgroup_operations(naga::valid::SubgroupOperationSet::all())
     .validate(&module)
     .unwrap_or_else(|error| panic!("{}", error.emit_to_string(wgsl)));
-    let options = TranslateOptions { checks };
-    Program::from_module_with("test", wgsl, &module, &info, "main", &options)
+    Program::from_module_with("test", wgsl, &module, &info, "main", options)
 }
 
 pub(crate) fn program(wgsl: &str) -> Program {

@@ -92,7 +92,7 @@ fn faults(found: &Sanitised) -> Vec<(Fault, u32)> {
     faults
 }
 
-fn at<'a>(found: &'a Sanitised, line: u32, fault: Fault) -> &'a Site {
+fn at(found: &Sanitised, line: u32, fault: Fault) -> &Site {
     found
         .sites
         .iter()

@@ -1,6 +1,8 @@
 //! Results moved within what WGSL allows a device: see
 //! [`Executor::with_perturbation`](super::Executor::with_perturbation).
 
+use std::cmp::Ordering;
+
 use super::link::Instr;
 use super::probe::{Scalar, Twin, ulp};
 use super::state::State;
@@ -179,14 +181,10 @@ impl Perturbed {
 fn neighbour(exact: f64, up: bool) -> f32 {
     let nearest = exact as f32;
     let back = f64::from(nearest);
-    if back == exact {
-        nearest
-    } else if up == (back > exact) {
-        nearest
-    } else if up {
-        nearest.next_up()
-    } else {
-        nearest.next_down()
+    match back.partial_cmp(&exact) {
+        Some(Ordering::Less) if up => nearest.next_up(),
+        Some(Ordering::Greater) if !up => nearest.next_down(),
+        _ => nearest,
     }
 }
 

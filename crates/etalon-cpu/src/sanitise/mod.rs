@@ -38,6 +38,9 @@ pub const VISIBLE: f64 = 1.0 / 2048.0;
 /// Relative error worth a look: NSan's threshold, 2⁻¹⁹.
 pub const NOTABLE: f64 = 1.0 / 524_288.0;
 
+/// Of how many executions one that loses digits is a fault, see [`Site::loses_often`].
+pub const OFTEN: u64 = 256;
+
 /// What is followed at a [`Site`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Role {
@@ -102,8 +105,8 @@ pub struct Site {
     /// The largest error that the operation itself made, in units in the last place:
     /// its result against that of `f64` on the same `f32` operands.
     pub introduced_ulps: f64,
-    /// Executions whose relative error is above [`VISIBLE`] while that of each operand
-    /// was not: here the digits were lost.
+    /// Executions whose relative error is above [`VISIBLE`] and over four times that of
+    /// each operand: here the digits were lost.
     pub lost: Count,
     /// The most leading bits that cancelled in a sum or difference of operands that
     /// carry an error.
@@ -161,9 +164,10 @@ pub enum Fault {
     Birth,
     /// A value is written whose relative error is above [`VISIBLE`].
     Inaccurate,
-    /// A sum or difference whose operands are accurate and whose result is not.
+    /// A sum or difference that is far less accurate than its operands, and that
+    /// not only where it happens to be next to 0: see [`Site::loses_often`].
     Cancellation,
-    /// Another operation whose operands are accurate and whose result is not.
+    /// Another operation that often is.
     Amplification,
     /// A comparison that turns out otherwise in `f64`.
     UnstableBranch,
@@ -232,10 +236,22 @@ impl Site {
             _ if matches!(self.operation.as_str(), "add.f" | "sub.f") => Fault::Cancellation,
             _ => Fault::Amplification,
         };
-        fault(lost, self.lost);
+        if self.role == Role::Store || self.loses_often() {
+            fault(lost, self.lost);
+        }
         fault(unstable, self.unstable);
         fault(Fault::Death, self.deaths);
         faults
+    }
+
+    /// Whether digits are lost here by rule rather than by chance: in more than one
+    /// execution of [`OFTEN`]. A difference that passes through zero loses the digits
+    /// that [`VISIBLE`] asks for where it is within 2⁻¹³ of its operands, which is one of
+    /// some thousand where it is spread evenly.
+    #[must_use]
+    pub fn loses_often(&self) -> bool {
+        let counted = self.executions - self.after_divergence.min(self.executions);
+        self.lost.times > counted / OFTEN
     }
 
     /// Bits of the largest error: the logarithm of units in the last place, from 1

@@ -190,7 +190,11 @@ impl Builder {
         let bits: Option<Vec<u32>> = operands.iter().map(|&v| self.constant_bits(v)).collect();
         if let Some(bits) = bits {
             let folded = op.visit::<f32, _>(Fold { bits: &bits });
-            return self.constant(op.result(), folded);
+            // What is born of constants is to be seen where it happens.
+            let is_wild = op.result() == Class::Float && !f32::from_bits(folded).is_finite();
+            if !(is_wild && self.instrument.probes) {
+                return self.constant(op.result(), folded);
+            }
         }
         let known = self.tree.values.len();
         let value = self.op(Op::Arith(op), operands, &[op.result()])[0];

@@ -84,6 +84,10 @@ fn number(
     }
 }
 
+/// How much larger than that of its operands an error must be to be blamed on the
+/// operation: products and powers double what they are given, and are not the reason.
+const GROWS: f64 = 4.0;
+
 /// Notes what the operands have to do with the error.
 fn given(
     tally: &mut Tally,
@@ -100,7 +104,7 @@ fn given(
                 relative(difference, operand.double)
             })
             .fold(0.0, f64::max);
-        if given <= VISIBLE {
+        if given * GROWS <= error {
             tally.lost.add(who.times, place);
         }
     }

@@ -37,6 +37,9 @@ enum Task {
     /// What accuracy costs in time: every setting's errors beside its time on
     /// every backend; `--help` after it says more.
     Accuracy(measure::Forwarded),
+    /// Every effect on a corpus of hard cases: numbers everywhere, the same bits on
+    /// every backend, rounding bounded; `--help` after it says more.
+    Stability(measure::Forwarded),
     /// Look whether the interpreter's handlers use vector instructions.
     CheckVectors(vectors::Options),
     /// Count the instructions the interpreter executes for each kernel.
@@ -74,6 +77,9 @@ pub fn main() -> ExitCode {
         ),
         Task::Accuracy(arguments) => conclude(
             measure::run(measure::ACCURACY, &[], &arguments).map_err(|error| error.to_string()),
+        ),
+        Task::Stability(arguments) => conclude(
+            measure::run(measure::STABILITY, &[], &arguments).map_err(|error| error.to_string()),
         ),
         Task::CheckVectors(options) => {
             conclude(vectors::run(&options).map_err(|error| error.to_string()))

@@ -1,6 +1,6 @@
 //! Tasks that measure. What is measured has to be built as it is released, so
-//! programs of their own do it, the packages `etalon-measure` and
-//! `etalon-accuracy`.
+//! programs of their own do it, the packages `etalon-measure`, `etalon-accuracy`
+//! and `etalon-stability`.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -43,6 +43,8 @@ fn cargo() -> Command {
 pub const INTERPRETER: &str = "etalon-measure";
 /// The program that measures what accuracy costs in time.
 pub const ACCURACY: &str = "etalon-accuracy";
+/// The program that runs the hard cases.
+pub const STABILITY: &str = "etalon-stability";
 
 /// Builds a measuring program in release profile and runs it with `first`
 /// arguments and those forwarded. Returns whether it succeeded; it has said itself

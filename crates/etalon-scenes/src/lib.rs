@@ -6,6 +6,7 @@
 //! * [`model`](mod@model): meshes, materials, lights and movements that backends draw.
 //! * [`models`](mod@models): a registry of procedural models.
 //! * [`scenes`](mod@scenes): a registry of procedural scenes.
+//! * [`cases`](mod@cases): inputs that are known to be hard, with their reasons.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
 //!
@@ -28,6 +29,7 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod cases;
 pub mod exr_frame;
 pub mod frame;
 mod import;

@@ -1,0 +1,7 @@
+//! What is asked of the results, a module for each question.
+
+pub mod agreement;
+pub mod finite;
+pub mod recovery;
+pub mod rounding;
+pub mod scale;

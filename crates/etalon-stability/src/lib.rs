@@ -1,0 +1,46 @@
+//! What effects make of hard inputs.
+//!
+//! Every effect is run on every case of a corpus ([`etalon_scenes::cases`], and the
+//! ends of every knob's range) by the interpreter in `f32`, in `f64` and in `f32`
+//! with an `f64` shadow, by wgpu and by Vulkan. Of what each pass wrote is asked:
+//!
+//! * are all numbers finite?
+//! * are wgpu's and Vulkan's bits the interpreter's, under strict arithmetic?
+//! * how far is `f32` from the `f64` that takes the same decisions?
+//!
+//! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
+//! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
+//! * [`judge`]: what is asked of that, a module for each question;
+//! * [`run`](mod@run): all of it, into a [`model::Report`];
+//! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
+//!
+//! ```
+//! use etalon_stability::executors::Kind;
+//! use etalon_stability::run::{Options, run};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let options = Options {
+//!     cases: vec!["size-3x3".to_owned()],
+//!     effects: vec!["bloom".to_owned()],
+//!     executors: vec![Kind::Cpu, Kind::Shadow],
+//!     ..Options::default()
+//! };
+//! let report = run(&options, &mut ())?;
+//! assert!(report.is_sound(), "{:?}", report.findings().next());
+//! # Ok(())
+//! # }
+//! ```
+
+#![forbid(unsafe_code)]
+
+pub mod executors;
+pub mod judge;
+pub mod knobs;
+pub mod model;
+pub mod observe;
+pub mod plant;
+pub mod report;
+pub mod run;
+pub mod subject;
+pub mod table;
+mod text;

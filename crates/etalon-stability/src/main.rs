@@ -1,0 +1,101 @@
+//! Runs every effect on the hard cases: see the library, and `--help`.
+
+#![forbid(unsafe_code)]
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use etalon_stability::executors::Kind;
+use etalon_stability::plant::Plant;
+use etalon_stability::run::{Options, Progress, run};
+use etalon_stability::{report, table};
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Runs every effect on a corpus of hard cases, on every backend: are all results
+/// numbers, the same bits everywhere, and near those of f64?
+///
+/// Ends with 0 if nothing was found that should not be, with 1 if something was, and
+/// with 2 if nothing could be found out.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Effects; all without it.
+    #[arg(long, value_delimiter = ',')]
+    effect: Vec<String>,
+    /// Parts of the names of cases; all without it.
+    #[arg(long, value_delimiter = ',')]
+    case: Vec<String>,
+    /// Executors; devices are compared with `cpu`, `cpu-f64` with `cpu-shadow`.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "cpu,cpu-f64,cpu-shadow,wgpu,ash"
+    )]
+    executor: Vec<Kind>,
+    /// Most texels of a frame; larger cases are left out.
+    #[arg(long)]
+    largest: Option<usize>,
+    /// Write a page with all cases, the worst first, here.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Write everything found to this file.
+    #[arg(long)]
+    json: Option<PathBuf>,
+    /// Plant a fault to be found, as `wgpu:nan`, `ash:bit` or `cpu-shadow:error`.
+    #[arg(long, hide = true)]
+    plant: Option<Plant>,
+}
+
+/// Progress as a bar with an estimate.
+struct Shown(ProgressBar);
+
+impl Progress for Shown {
+    fn begin(&mut self, pairs: usize) {
+        self.0.set_length(pairs as u64);
+    }
+
+    fn next(&mut self, case: &str, effect: &str) {
+        self.0.set_message(format!("{effect} on {case}"));
+        self.0.inc(1);
+    }
+}
+
+impl Arguments {
+    fn run(self) -> Result<bool, String> {
+        let options = Options {
+            cases: self.case,
+            effects: self.effect,
+            executors: self.executor,
+            largest: self.largest,
+            plant: self.plant,
+        };
+        // The template is a constant that is right.
+        let style = ProgressStyle::with_template("{wide_bar} {pos}/{len}, {eta} left  {msg}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+        let mut shown = Shown(ProgressBar::new(0).with_style(style));
+        let found = run(&options, &mut shown);
+        shown.0.finish_and_clear();
+        let found = found.map_err(|error| error.to_string())?;
+        print!("{}", table::text(&found));
+        if let Some(path) = &self.json {
+            let text = report::json(&found).map_err(|error| error.to_string())?;
+            report::write_text(path, &text).map_err(|error| error.to_string())?;
+        }
+        if let Some(folder) = &self.report {
+            let page = report::write(&found, folder).map_err(|error| error.to_string())?;
+            println!("{}", page.display());
+        }
+        Ok(found.is_sound())
+    }
+}
+
+fn main() -> ExitCode {
+    match Arguments::parse().run() {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}

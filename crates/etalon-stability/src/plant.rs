@@ -1,0 +1,90 @@
+//! Faults planted into results, to see that they are found.
+
+use std::str::FromStr;
+
+use etalon_core::texel::Texel;
+
+use crate::executors::Kind;
+use crate::observe::Store;
+
+/// What is done to a frame's results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A texel of the first pass that stores floats becomes NaN.
+    Nan,
+    /// A bit of a texel of the last pass is turned.
+    Bit,
+    /// A texel's shadow is moved by a hundredth of its value.
+    Error,
+}
+
+/// A fault for an executor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Plant {
+    /// Whose results.
+    pub executor: Kind,
+    /// What is done to them.
+    pub fault: Fault,
+}
+
+impl FromStr for Plant {
+    type Err = String;
+
+    /// `EXECUTOR:FAULT`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (executor, fault) = text
+            .split_once(':')
+            .ok_or_else(|| format!("`{text}` is no fault like wgpu:nan"))?;
+        Ok(Self {
+            executor: executor.parse()?,
+            fault: match fault {
+                "nan" => Fault::Nan,
+                "bit" => Fault::Bit,
+                "error" => Fault::Error,
+                _ => {
+                    return Err(format!(
+                        "there is no fault `{fault}`; there are nan, bit, error"
+                    ));
+                }
+            },
+        })
+    }
+}
+
+impl Fault {
+    /// Does it to a frame's results.
+    pub fn strike(self, stores: &mut [Store]) {
+        match self {
+            Self::Nan => {
+                let images = stores.iter_mut().filter_map(|store| store.image.as_mut());
+                for image in images {
+                    let format = image.desc.format;
+                    let size = format.texel_bytes() as usize;
+                    let Some(bytes) = image.bytes.get_mut(..size) else {
+                        continue;
+                    };
+                    format.encode(Texel::Float([f32::NAN; 4]), bytes);
+                    if format.is_non_finite(0, format.codes(bytes).channels[0]) {
+                        return;
+                    }
+                }
+            }
+            Self::Bit => {
+                let last = stores
+                    .iter_mut()
+                    .rev()
+                    .find_map(|store| store.image.as_mut());
+                if let Some(byte) = last.and_then(|image| image.bytes.first_mut()) {
+                    *byte ^= 1;
+                }
+            }
+            Self::Error => {
+                let texels = stores.iter_mut().filter_map(|store| store.wide.as_mut());
+                let brightest = texels.flatten().max_by(|a, b| a[0].total_cmp(&b[0]));
+                if let Some(texel) = brightest {
+                    texel[0] = texel[0] * 1.01 + 0.01;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Faults planted into results are found, named, and end the program as they should.
+
+use std::process::Command;
+
+use etalon_stability::executors::Kind;
+use etalon_stability::model::{FindingKind, Report};
+use etalon_stability::plant::{Fault, Plant};
+use etalon_stability::report;
+use etalon_stability::run::{Options, run};
+
+fn planted(plant: Option<Plant>) -> Report {
+    let options = Options {
+        cases: vec!["size-5x5".to_owned()],
+        effects: vec!["ssr".to_owned()],
+        executors: vec![Kind::Cpu, Kind::Double, Kind::Shadow],
+        plant,
+        ..Options::default()
+    };
+    run(&options, &mut ()).unwrap()
+}
+
+fn kinds(report: &Report) -> Vec<FindingKind> {
+    report.findings().map(|(_, finding)| finding.kind).collect()
+}
+
+#[test]
+fn without_a_fault_nothing_is_found() {
+    let report = planted(None);
+    assert!(report.is_sound(), "{:?}", report.findings().collect::<Vec<_>>());
+    assert_eq!(report.totals.findings, 0);
+}
+
+#[test]
+fn a_nan_is_found_with_its_place() {
+    let report = planted(Some(Plant {
+        executor: Kind::Cpu,
+        fault: Fault::Nan,
+    }));
+    assert_eq!(kinds(&report), [FindingKind::NonFinite]);
+    let wrong = report.cases[0].on("cpu").unwrap().non_finite.as_ref().unwrap();
+    assert_eq!((wrong.first.x, wrong.first.y, wrong.first.frame), (0, 0, 0));
+    assert_eq!(wrong.first.pass, "ssr/march");
+    assert_eq!(wrong.channels, 4);
+}
+
+#[test]
+fn an_error_of_a_hundredth_is_found() {
+    let report = planted(Some(Plant {
+        executor: Kind::Shadow,
+        fault: Fault::Error,
+    }));
+    assert_eq!(kinds(&report), [FindingKind::Rounding; 1]);
+    let wrong = report.cases[0].on("cpu-shadow").unwrap().rounding.as_ref().unwrap();
+    assert!(wrong.beyond >= 1 && wrong.max > 0.005 && wrong.max < 0.5, "{wrong:?}");
+}
+
+/// A device is needed for something to differ from.
+#[test]
+fn a_bit_is_found_on_a_device() {
+    for kind in [Kind::Wgpu, Kind::Ash] {
+        let options = Options {
+            cases: vec!["size-5x5".to_owned()],
+            effects: vec!["bloom".to_owned()],
+            executors: vec![Kind::Cpu, kind],
+            plant: Some(Plant {
+                executor: kind,
+                fault: Fault::Bit,
+            }),
+            ..Options::default()
+        };
+        let report = run(&options, &mut ()).unwrap();
+        if report.executors.len() < 2 {
+            eprintln!("without {kind}: {:?}", report.notes);
+            continue;
+        }
+        assert_eq!(kinds(&report), [FindingKind::Disagreement]);
+        let wrong = report.cases[0].on(kind.name()).unwrap().difference.as_ref().unwrap();
+        assert_eq!((wrong.texels, wrong.ulps), (1, 1));
+        assert_eq!((wrong.first.x, wrong.first.y), (0, 0));
+    }
+}
+
+/// The program with a fault, its exit status and what it said.
+fn program(arguments: &[&str]) -> (Option<i32>, String) {
+    let output = Command::new(env!("CARGO_BIN_EXE_etalon-stability"))
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8_lossy(&text).into_owned())
+}
+
+#[test]
+fn the_exit_status_tells_findings_from_faults_of_the_command() {
+    let few = ["--case", "size-5x5", "--effect", "ssr", "--executor", "cpu,cpu-shadow"];
+    let with = |more: &[&str]| program(&[&few[..], more].concat());
+    let (status, text) = with(&[]);
+    assert_eq!(status, Some(0), "{text}");
+    assert!(text.contains("nothing found"), "{text}");
+    for (fault, said) in [
+        ("cpu:nan", "no numbers"),
+        ("cpu-shadow:nan", "no numbers"),
+        ("cpu-shadow:error", "off by more than"),
+    ] {
+        let (status, text) = with(&["--plant", fault]);
+        assert_eq!(status, Some(1), "{fault}: {text}");
+        assert!(text.contains(said) && text.contains("size-5x5"), "{fault}: {text}");
+    }
+    let (status, text) = program(&["--effect", "none"]);
+    assert_eq!(status, Some(2), "{text}");
+    assert!(text.contains("no effect `none`"), "{text}");
+    assert_eq!(program(&["--plant", "cpu"]).0, Some(2));
+    assert_eq!(program(&["--executor", "gpu"]).0, Some(2));
+}
+
+#[test]
+fn what_is_written_is_what_is_read() {
+    let report = planted(Some(Plant {
+        executor: Kind::Cpu,
+        fault: Fault::Nan,
+    }));
+    let folder = tempfile::tempdir().unwrap();
+    let page = report::write(&report, folder.path()).unwrap();
+    let text = std::fs::read_to_string(folder.path().join(report::DATA)).unwrap();
+    assert_eq!(serde_json::from_str::<Report>(&text).unwrap(), report);
+    let data: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let case = &data["cases"][0];
+    for field in ["name", "effect", "reason", "source"] {
+        assert!(case[field].as_str().is_some_and(|text| !text.is_empty()), "{field}");
+    }
+    assert_eq!(case["results"].as_array().unwrap().len(), 3);
+    assert_eq!(case["results"][0]["status"]["is"], "ran");
+    assert_eq!(data["totals"]["cases"], 1);
+    assert!(data["totals"]["executions"].as_u64().unwrap() > 3);
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(page.contains("size-5x5") && page.contains("no numbers"));
+    assert!(!page.contains("http://") && !page.contains("https://"));
+}

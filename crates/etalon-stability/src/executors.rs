@@ -7,7 +7,7 @@ use etalon_ash::{AshBackend, AshOptions, Validation};
 use etalon_core::backend::{Backend, BackendError, BackendInfo, Inputs};
 use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::Plan;
-use etalon_cpu::{CpuBackend, CpuOptions, NumberType};
+use etalon_cpu::{CpuBackend, CpuOptions, NumberType, StepSanitised};
 use etalon_wgpu::{WgpuBackend, WgpuOptions, wgpu::Backends};
 
 use crate::observe::{ObserveError, Store, stores, wide_stores};
@@ -22,6 +22,8 @@ pub enum Kind {
     /// The interpreter in `f32` with an `f64` shadow, which takes the decisions of
     /// the `f32`.
     Shadow,
+    /// The interpreter in `f32`, followed by the numerical sanitiser.
+    Sanitiser,
     /// wgpu on Vulkan.
     Wgpu,
     /// Vulkan.
@@ -30,7 +32,14 @@ pub enum Kind {
 
 impl Kind {
     /// All of them, in the order they are run in.
-    pub const ALL: [Self; 5] = [Self::Cpu, Self::Double, Self::Shadow, Self::Wgpu, Self::Ash];
+    pub const ALL: [Self; 6] = [
+        Self::Cpu,
+        Self::Double,
+        Self::Shadow,
+        Self::Sanitiser,
+        Self::Wgpu,
+        Self::Ash,
+    ];
 
     /// By which it is known.
     #[must_use]
@@ -39,6 +48,7 @@ impl Kind {
             Self::Cpu => "cpu",
             Self::Double => "cpu-f64",
             Self::Shadow => "cpu-shadow",
+            Self::Sanitiser => "sanitiser",
             Self::Wgpu => "wgpu",
             Self::Ash => "ash",
         }
@@ -61,7 +71,9 @@ impl Kind {
         match self {
             Self::Cpu => &[Arithmetic::Strict],
             Self::Double => &[Arithmetic::Fast],
-            Self::Shadow | Self::Wgpu | Self::Ash => &[Arithmetic::Strict, Arithmetic::Fast],
+            Self::Shadow | Self::Sanitiser | Self::Wgpu | Self::Ash => {
+                &[Arithmetic::Strict, Arithmetic::Fast]
+            }
         }
     }
 }
@@ -119,6 +131,11 @@ impl Executor {
             Kind::Cpu => interpreter(NumberType::F32)?,
             Kind::Double => interpreter(NumberType::F64)?,
             Kind::Shadow => interpreter(NumberType::Shadow)?,
+            Kind::Sanitiser => CpuBackend::new(&CpuOptions {
+                sanitise: true,
+                ..CpuOptions::default()
+            })
+            .map(|backend| Backing::Interpreter(Box::new(backend)))?,
             Kind::Wgpu => Backing::Device(Box::new(WgpuBackend::new(&WgpuOptions {
                 backends: Backends::VULKAN,
                 ..WgpuOptions::default()
@@ -154,13 +171,21 @@ impl Executor {
         }
     }
 
+    /// What the sanitiser found since this was last asked; nothing of other executors.
+    pub fn take_sanitised(&mut self) -> Vec<StepSanitised> {
+        match &mut self.backing {
+            Backing::Interpreter(backend) => backend.take_sanitised(),
+            Backing::Device(_) => Vec::new(),
+        }
+    }
+
     /// Runs a frame, and gives what its passes wrote, in their order.
     ///
     /// # Errors
     /// If the plan cannot be run, or memory runs out.
     pub fn run(&mut self, plan: &Plan, inputs: &Inputs<'_>) -> Result<Vec<Store>, ObserveError> {
         match &mut self.backing {
-            Backing::Interpreter(backend) if self.kind != Kind::Cpu => {
+            Backing::Interpreter(backend) if matches!(self.kind, Kind::Double | Kind::Shadow) => {
                 Ok(wide_stores(backend.execute_wide(plan, inputs)?))
             }
             Backing::Interpreter(backend) => Ok(stores(backend.execute(plan, inputs)?)),

@@ -7,10 +7,13 @@
 //! * are all numbers finite?
 //! * are wgpu's and Vulkan's bits the interpreter's, under strict arithmetic?
 //! * how far is `f32` from the `f64` that takes the same decisions?
+//! * and at which operation of which kernel did it lose its digits, or decide what
+//!   `f64` would not?
 //!
 //! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
 //! * [`judge`]: what is asked of that, a module for each question;
+//! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
 //! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
 //!
@@ -41,6 +44,7 @@ pub mod observe;
 pub mod plant;
 pub mod report;
 pub mod run;
+pub mod sanitise;
 pub mod subject;
 pub mod table;
 mod text;

@@ -29,7 +29,7 @@ struct Arguments {
     #[arg(
         long,
         value_delimiter = ',',
-        default_value = "cpu,cpu-f64,cpu-shadow,wgpu,ash"
+        default_value = "cpu,cpu-f64,cpu-shadow,sanitiser,wgpu,ash"
     )]
     executor: Vec<Kind>,
     /// Most texels of a frame; larger cases are left out.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::judge::agreement::Difference;
 use crate::judge::finite::NonFinite;
 use crate::judge::rounding::Rounding;
+use crate::sanitise;
 
 /// Everything that a run found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -17,6 +18,14 @@ pub struct Report {
     pub executors: Vec<ExecutorInfo>,
     /// An entry for each case and effect, in the order they were run in.
     pub cases: Vec<CaseReport>,
+    /// What the sanitiser found in kernels, over all cases: what counts against them
+    /// first.
+    pub sites: Vec<sanitise::Finding>,
+    /// Where, for each of those that there was room for.
+    #[serde(skip)]
+    pub maps: Vec<Option<sanitise::HeatMap>>,
+    /// What comments in kernels allow and was not found: file, line and fault.
+    pub unused: Vec<(String, u32, String)>,
     /// What was said to values that are not allowed.
     pub refusals: Vec<Refusal>,
     /// Executors that were not there, and why.
@@ -169,6 +178,8 @@ pub struct ExecutorResult {
     /// Texels that come out otherwise where `f64` decides for itself; of the `f64`
     /// run beside the shadow's.
     pub decided_otherwise: Option<u64>,
+    /// What the sanitiser counted; of the sanitiser.
+    pub sanitised: Option<sanitise::Counts>,
 }
 
 /// What kind of thing should not be.
@@ -181,6 +192,10 @@ pub enum FindingKind {
     Disagreement,
     /// `f32` is too far from `f64`.
     Rounding,
+    /// A kernel gave birth to a NaN or infinity.
+    Birth,
+    /// A kernel stores what rounding has made inaccurate.
+    Inaccurate,
     /// A fault in one frame shows longer than it may.
     Recovery,
     /// It could not be run.

@@ -7,6 +7,7 @@ use etalon_core::graph::Graph;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_core::resource::Limits;
+use etalon_cpu::StepSanitised;
 use etalon_effects::knob::KnobValue;
 use etalon_effects::{EffectEntry, EffectError, effect, effects};
 use etalon_scenes::cases::{Step, case};
@@ -21,6 +22,7 @@ use crate::model::{
 };
 use crate::observe::{ObserveError, Store};
 use crate::plant::Plant;
+use crate::sanitise::{AllowError, Counts, Watch};
 use crate::subject::{Subject, SubjectError, subjects};
 
 /// What is run.
@@ -81,6 +83,9 @@ pub enum RunError {
     /// A case has no frames.
     #[error(transparent)]
     Subject(#[from] SubjectError),
+    /// A comment in a kernel that is for the sanitiser cannot be understood.
+    #[error(transparent)]
+    Allow(#[from] AllowError),
     /// An executor that `ETALON_REQUIRE` names is not there.
     #[error("{name} is required: {source}")]
     Required {
@@ -128,6 +133,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
     let kernels = KernelLibrary::new();
+    let mut watch = Watch::new()?;
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
     let mut named = std::collections::BTreeSet::new();
     for (subject, effects) in &chosen {
@@ -146,7 +152,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
                 kernels: &kernels,
                 plant: options.plant,
             };
-            report.cases.push(pair.run(&mut executors));
+            report.cases.push(pair.run(&mut executors, &mut watch));
         }
     }
     // Values that are not allowed cost no execution: they are tried whenever no
@@ -158,6 +164,15 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
             |effect: &String| options.effects.is_empty() || options.effects.contains(effect);
         report.refusals = knobs::refusals(frames);
         report.refusals.retain(|refusal| wanted(&refusal.effect));
+    }
+    let (found, unused) = watch.finish();
+    for found in found {
+        report.sites.push(found.finding);
+        report.maps.push(found.map);
+    }
+    // Of a part of the corpus nothing can be said of what is not found.
+    if options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none() {
+        report.unused = unused;
     }
     report.totals = Totals {
         cases: named.len(),
@@ -249,7 +264,7 @@ struct Pair<'a> {
 type Frames = Vec<Vec<Store>>;
 
 impl Pair<'_> {
-    fn run(&self, executors: &mut [Executor]) -> CaseReport {
+    fn run(&self, executors: &mut [Executor], watch: &mut Watch) -> CaseReport {
         let Self {
             subject, effect, ..
         } = self;
@@ -282,7 +297,8 @@ impl Pair<'_> {
         let mut reference = None;
         let mut double = None;
         for executor in executors {
-            let result = self.on(executor, &mut reference, &mut double, &mut report.findings);
+            let found = &mut report.findings;
+            let result = self.on(executor, watch, &mut reference, &mut double, found);
             report.results.push(result);
         }
         report
@@ -293,6 +309,7 @@ impl Pair<'_> {
     fn on(
         &self,
         executor: &mut Executor,
+        watch: &mut Watch,
         reference: &mut Option<Frames>,
         double: &mut Option<Frames>,
         findings: &mut Vec<Finding>,
@@ -303,11 +320,7 @@ impl Pair<'_> {
             ..ExecutorResult::default()
         };
         let mut errors = rounding::Gathering::new(
-            self.subject
-                .expected
-                .iter()
-                .find(|known| known.effect == self.effect.name)
-                .map(|known| known.bound),
+            self.expected(),
             self.subject
                 .knobs
                 .contains(&("metering", KnobValue::Choice("arithmetic"))),
@@ -349,6 +362,13 @@ impl Pair<'_> {
                     });
                 }
                 Kind::Shadow => {}
+                Kind::Sanitiser => {
+                    let steps = executor.take_sanitised();
+                    let counts = result.sanitised.get_or_insert_default();
+                    let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name);
+                    findings.extend(watch.look(&case, &steps, self.expected(), counts));
+                    self.effects(arithmetic, &steps, &frames, double.as_ref(), counts);
+                }
                 Kind::Wgpu | Kind::Ash if arithmetic == Arithmetic::Strict => {
                     let pairs = reference.iter().flatten().zip(&frames);
                     for (number, (reference, subject)) in pairs.enumerate() {
@@ -363,6 +383,35 @@ impl Pair<'_> {
         }
         findings.extend(conclusions(&result));
         result
+    }
+
+    /// The error that the case declares for the effect.
+    fn expected(&self) -> Option<f64> {
+        let declared = self.subject.expected.iter();
+        declared
+            .filter(|known| known.effect == self.effect.name)
+            .map(|known| known.bound)
+            .next()
+    }
+
+    /// What decisions that are not stable do to what is stored: `f64` was run in fast
+    /// arithmetic, so that is when it can be told. Steps are those of all frames.
+    fn effects(
+        &self,
+        arithmetic: Arithmetic,
+        steps: &[StepSanitised],
+        frames: &Frames,
+        double: Option<&Frames>,
+        counts: &mut Counts,
+    ) {
+        let Some(double) = double.filter(|_| arithmetic == Arithmetic::Fast) else {
+            return;
+        };
+        let each = steps.len() / frames.len().max(1);
+        let chunks = steps.chunks(each.max(1));
+        for ((steps, single), double) in chunks.zip(frames).zip(double) {
+            counts.compare(steps, single, double);
+        }
     }
 
     /// Runs the frames in a row from a fresh history.

@@ -28,6 +28,7 @@ pub fn text(report: &Report) -> String {
     }
     families(&mut out, report);
     rows(&mut out, report);
+    sites(&mut out, report);
     let findings: Vec<_> = report.findings().collect();
     if !findings.is_empty() {
         let _ = writeln!(out, "\nFindings");
@@ -109,24 +110,67 @@ fn rows(out: &mut String, report: &Report) {
     }
     let _ = writeln!(
         out,
-        "\n{:<44} {:<10} {:>9} {:>9} {:>9} {:>9}  executors",
-        "case", "effect", "max error", "99.9 %", "allowed", "otherwise"
+        "\n{:<44} {:<10} {:>9} {:>9} {:>9} {:>9} {:>8}  executors",
+        "case", "effect", "max error", "99.9 %", "allowed", "otherwise", "unstable"
     );
     for case in cases {
         let shadow = case.results.iter().find(|one| one.rounding.is_some());
         let rounding = shadow.and_then(|one| one.rounding.as_ref());
         let otherwise = shadow.and_then(|one| one.decided_otherwise);
+        let counts = case.results.iter().find_map(|one| one.sanitised);
+        let unstable = counts.map(|one| one.unstable_branches + one.unstable_indices);
         let _ = writeln!(
             out,
-            "{:<44} {:<10} {:>9} {:>9} {:>9} {:>9}  {}",
+            "{:<44} {:<10} {:>9} {:>9} {:>9} {:>9} {:>8}  {}",
             case.name,
             case.effect,
             rounding.map_or_else(|| "-".to_owned(), |one| power(one.max)),
             rounding.map_or_else(|| "-".to_owned(), |one| power(one.p999)),
             rounding.map_or_else(|| "-".to_owned(), |one| power(one.allowed)),
             otherwise.map_or_else(|| "-".to_owned(), |count| count.to_string()),
+            unstable.map_or_else(|| "-".to_owned(), |count| count.to_string()),
             case.results.iter().map(sign).collect::<Vec<_>>().join(" "),
         );
+    }
+}
+
+/// A line for each place in a kernel at which something is wrong that it does not allow.
+fn sites(out: &mut String, report: &Report) {
+    let open: Vec<_> = report
+        .sites
+        .iter()
+        .filter(|site| site.allowed.is_none())
+        .collect();
+    if !report.sites.is_empty() {
+        let _ = writeln!(
+            out,
+            "\n{:<30} {:<12} {:<16} {:>10} {:>13} {:>9} {:>8}  worst in",
+            "kernel", "operation", "fault", "times", "of", "by", "bits"
+        );
+    }
+    for site in &open {
+        let _ = writeln!(
+            out,
+            "{:<30} {:<12} {:<16} {:>10} {:>13} {:>9} {:>8}  {}",
+            site.place(),
+            site.operation,
+            site.fault,
+            site.times,
+            site.executions,
+            power(site.severity),
+            site.cancelled_bits,
+            site.worst_case,
+        );
+    }
+    if report.sites.len() > open.len() {
+        let allowed = report.sites.len() - open.len();
+        let _ = writeln!(
+            out,
+            "{allowed} more that kernels allow, each with its reason"
+        );
+    }
+    for (file, line, fault) in &report.unused {
+        let _ = writeln!(out, "{file}:{line} allows {fault}, which no case has");
     }
 }
 

@@ -15,6 +15,7 @@ pub fn render(report: &Report) -> String {
     let mut body = String::new();
     header(&mut body, report);
     executors(&mut body, report);
+    super::sites::sites(&mut body, report);
     cases(&mut body, report);
     refusals(&mut body, report);
     format!(
@@ -77,7 +78,7 @@ fn cases(body: &mut String, report: &Report) {
         "<h2>Cases, the worst first</h2>\n<p><input id=\"filter\" type=\"search\" aria-label=\"Filter\" \
          placeholder=\"words of a case, effect or reason\"> <span id=\"shown\" class=\"muted\"></span></p>\n\
          <div class=\"scroll\"><table id=\"cases\">\n<thead><tr><th>Case</th><th>Effect</th><th>Error</th>\
-         <th>99.9 %</th><th>Allowed</th><th>Otherwise</th><th>Executors</th></tr></thead>\n<tbody>\n",
+         <th>99.9 %</th><th>Allowed</th><th>Otherwise</th><th>Unstable</th><th>Executors</th></tr></thead>\n<tbody>\n",
     );
     for case in cases {
         row(body, case);
@@ -145,13 +146,34 @@ fn row(body: &mut String, case: &CaseReport) {
     let _ = writeln!(
         body,
         "</td><td>{}</td><td class=\"number\"{place}>{}</td><td class=\"number\">{}</td>\
-         <td class=\"number\">{}</td><td class=\"number\">{otherwise}</td><td>{}</td></tr>",
+         <td class=\"number\">{}</td><td class=\"number\">{otherwise}</td>{}<td>{}</td></tr>",
         escape(&case.effect),
         figure(rounding.map(|one| one.max)),
         figure(rounding.map(|one| one.p999)),
         figure(rounding.map(|one| one.allowed)),
+        unstable(case),
         case.results.iter().map(badge).collect::<Vec<_>>().join(" "),
     );
+}
+
+/// Decisions that are not stable, and what they do.
+fn unstable(case: &CaseReport) -> String {
+    let counts = case.results.iter().find_map(|one| one.sanitised.as_ref());
+    counts.map_or_else(
+        || "<td class=\"number\">–</td>".to_owned(),
+        |counts| {
+            format!(
+                "<td class=\"number\" title=\"{} comparisons, {} integers; {} of {} texels stored come out \
+                 otherwise, by {} at most\">{}</td>",
+                counts.unstable_branches,
+                counts.unstable_indices,
+                counts.effect.changed,
+                counts.effect.texels,
+                power(counts.effect.largest),
+                counts.unstable_branches + counts.unstable_indices,
+            )
+        },
+    )
 }
 
 fn badge(result: &ExecutorResult) -> String {

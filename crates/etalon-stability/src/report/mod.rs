@@ -1,6 +1,7 @@
-//! The report: a web page that needs nothing but itself.
+//! The report: a web page that needs nothing but itself and the maps beside it.
 
 mod html;
+mod sites;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,6 +28,14 @@ pub enum ReportError {
         path: PathBuf,
         /// Why not.
         source: io::Error,
+    },
+    /// A map cannot be drawn.
+    #[error("{}: {source}", path.display())]
+    Picture {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: image::ImageError,
     },
     /// The data cannot be put into words.
     #[error(transparent)]
@@ -55,7 +64,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), ReportError> {
     })
 }
 
-/// Writes the page and its data into a folder, which is made if there is none; the
+/// Writes the page, its data and maps into a folder, which is made if there is none; the
 /// page's path.
 ///
 /// # Errors
@@ -65,8 +74,31 @@ pub fn write(report: &Report, folder: &Path) -> Result<PathBuf, ReportError> {
         path: folder.to_owned(),
         source,
     })?;
+    let report = &with_maps(report, folder)?;
     write_text(&folder.join(DATA), &json(report)?)?;
     let page = folder.join(PAGE);
     write_text(&page, &render(report))?;
     Ok(page)
+}
+
+/// Most maps that are drawn: those of what is worst.
+const MAPS: usize = 64;
+
+/// Draws maps into the folder and says which is whose.
+fn with_maps(report: &Report, folder: &Path) -> Result<Report, ReportError> {
+    let mut report = report.clone();
+    let maps = std::mem::take(&mut report.maps);
+    let sites = report.sites.iter_mut().zip(&maps).enumerate();
+    for (number, (site, map)) in sites.take(MAPS) {
+        let Some(map) = map else { continue };
+        let file = format!("heat-{number}.png");
+        let path = folder.join(&file);
+        let bytes = map.png().map_err(|source| ReportError::Picture {
+            path: path.clone(),
+            source,
+        })?;
+        std::fs::write(&path, bytes).map_err(|source| ReportError::Io { path, source })?;
+        site.heat = Some(file);
+    }
+    Ok(report)
 }

@@ -60,8 +60,9 @@ impl Kind {
     pub const fn arithmetics(self) -> &'static [Arithmetic] {
         match self {
             Self::Cpu => &[Arithmetic::Strict],
-            Self::Double => &[Arithmetic::Fast],
-            Self::Shadow | Self::Wgpu | Self::Ash => &[Arithmetic::Strict, Arithmetic::Fast],
+            Self::Double | Self::Shadow | Self::Wgpu | Self::Ash => {
+                &[Arithmetic::Strict, Arithmetic::Fast]
+            }
         }
     }
 }

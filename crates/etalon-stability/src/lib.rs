@@ -10,6 +10,7 @@
 //!
 //! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
+//! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
 //! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
@@ -35,6 +36,7 @@
 
 pub mod executors;
 pub mod judge;
+pub mod kernels;
 pub mod knobs;
 pub mod model;
 pub mod observe;

@@ -166,9 +166,6 @@ pub struct ExecutorResult {
     pub difference: Option<Difference>,
     /// How far `f32` is from `f64`; of the shadow.
     pub rounding: Option<Rounding>,
-    /// Texels that come out otherwise where `f64` decides for itself; of the `f64`
-    /// run beside the shadow's.
-    pub decided_otherwise: Option<u64>,
 }
 
 /// What kind of thing should not be.

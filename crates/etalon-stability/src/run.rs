@@ -36,6 +36,8 @@ pub struct Options {
     /// Most texels of a case's frame; larger cases are left out. All are run
     /// without it.
     pub largest: Option<usize>,
+    /// Kernels in place of those built in: see [`kernels`](crate::kernels).
+    pub kernels: Vec<(String, String)>,
     /// A fault to be found.
     pub plant: Option<Plant>,
 }
@@ -47,6 +49,7 @@ impl Default for Options {
             effects: Vec::new(),
             executors: Kind::ALL.to_vec(),
             largest: None,
+            kernels: Vec::new(),
             plant: None,
         }
     }
@@ -127,7 +130,10 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let chosen = choose(options)?;
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
-    let kernels = KernelLibrary::new();
+    let mut kernels = KernelLibrary::new();
+    for (path, text) in &options.kernels {
+        kernels.add_source(path, text);
+    }
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
     let mut named = std::collections::BTreeSet::new();
     for (subject, effects) in &chosen {
@@ -248,6 +254,15 @@ struct Pair<'a> {
 /// What all frames of a case stored.
 type Frames = Vec<Vec<Store>>;
 
+/// What later executors are held to.
+#[derive(Default)]
+struct Kept {
+    /// What the interpreter stored.
+    reference: Frames,
+    /// What it stored in `f64`, in each arithmetic.
+    double: Vec<(Arithmetic, Frames)>,
+}
+
 impl Pair<'_> {
     fn run(&self, executors: &mut [Executor]) -> CaseReport {
         let Self {
@@ -279,22 +294,19 @@ impl Pair<'_> {
             }),
             ..CaseReport::default()
         };
-        let mut reference = None;
-        let mut double = None;
+        let mut kept = Kept::default();
         for executor in executors {
-            let result = self.on(executor, &mut reference, &mut double, &mut report.findings);
+            let result = self.on(executor, &mut kept, &mut report.findings);
             report.results.push(result);
         }
         report
     }
 
-    /// Runs it on one executor. What the interpreter stored is kept in `reference`
-    /// for devices, what it stored in `f64` in `double` for the shadow.
+    /// Runs it on one executor, and keeps what others are held to.
     fn on(
         &self,
         executor: &mut Executor,
-        reference: &mut Option<Frames>,
-        double: &mut Option<Frames>,
+        kept: &mut Kept,
         findings: &mut Vec<Finding>,
     ) -> ExecutorResult {
         let kind = executor.kind;
@@ -328,29 +340,25 @@ impl Pair<'_> {
             for (number, stores) in frames.iter().enumerate() {
                 result.stores += stores.len();
                 finite::look(number, stores, &mut result.non_finite);
-                if kind == Kind::Shadow {
-                    errors.look(number, stores);
-                }
             }
             match kind {
                 Kind::Cpu => {
                     if let Some(finding) = self.recovery(executor, &frames) {
                         findings.push(finding);
                     }
-                    *reference = Some(frames);
+                    kept.reference = frames;
                 }
-                Kind::Double => *double = Some(frames),
-                Kind::Shadow if arithmetic == Arithmetic::Fast => {
-                    let pairs = frames.iter().zip(double.iter().flatten());
-                    result.decided_otherwise = double.is_some().then(|| {
-                        pairs
-                            .map(|(shadow, double)| rounding::decided_otherwise(shadow, double))
-                            .sum()
-                    });
+                Kind::Double => kept.double.push((arithmetic, frames)),
+                Kind::Shadow => {
+                    let double = kept.double.iter().find(|(known, _)| *known == arithmetic);
+                    for (number, stores) in frames.iter().enumerate() {
+                        let double = double.and_then(|(_, frames)| frames.get(number));
+                        let double = double.map_or(&[][..], Vec::as_slice);
+                        errors.look(number, stores, double, arithmetic == Arithmetic::Strict);
+                    }
                 }
-                Kind::Shadow => {}
                 Kind::Wgpu | Kind::Ash if arithmetic == Arithmetic::Strict => {
-                    let pairs = reference.iter().flatten().zip(&frames);
+                    let pairs = kept.reference.iter().zip(&frames);
                     for (number, (reference, subject)) in pairs.enumerate() {
                         agreement::compare(number, reference, subject, &mut result.difference);
                     }
@@ -421,6 +429,9 @@ impl Pair<'_> {
     /// replaced by the one after it.
     fn recovery(&self, executor: &mut Executor, faulty: &[Vec<Store>]) -> Option<Finding> {
         let recovery = self.subject.recovery?;
+        if recovery.effect != self.effect.name {
+            return None;
+        }
         let mut steps = self.steps.to_vec();
         let good = steps.get(recovery.poisoned + 1)?.clone();
         *steps.get_mut(recovery.poisoned)? = good;

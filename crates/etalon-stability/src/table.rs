@@ -115,7 +115,7 @@ fn rows(out: &mut String, report: &Report) {
     for case in cases {
         let shadow = case.results.iter().find(|one| one.rounding.is_some());
         let rounding = shadow.and_then(|one| one.rounding.as_ref());
-        let otherwise = shadow.and_then(|one| one.decided_otherwise);
+        let otherwise = rounding.map(|one| one.otherwise);
         let _ = writeln!(
             out,
             "{:<44} {:<10} {:>9} {:>9} {:>9} {:>9}  {}",

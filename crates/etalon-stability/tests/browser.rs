@@ -54,7 +54,10 @@ fn open(found: &Report) -> Option<serde_json::Value> {
     let Some(browser) = browser() else {
         let required = std::env::var("ETALON_REQUIRE")
             .is_ok_and(|list| list.split(',').any(|one| one.trim() == "chromium"));
-        assert!(!required, "ETALON_REQUIRE asks for `chromium`: there is none");
+        assert!(
+            !required,
+            "ETALON_REQUIRE asks for `chromium`: there is none"
+        );
         eprintln!("no Chromium here: the page was not opened");
         return None;
     };
@@ -113,7 +116,10 @@ fn the_worst_case_comes_first_and_words_filter() {
     let bad: Vec<bool> = serde_json::from_value(found["bad"].clone()).unwrap();
     assert!(bad[0] && bad.is_sorted_by(|a, b| a >= b), "{bad:?}");
     assert!(bad.iter().any(|bad| !bad), "{bad:?}");
-    assert!(found["first"].as_str().unwrap().contains("no numbers"), "{found:#}");
+    assert!(
+        found["first"].as_str().unwrap().contains("no numbers"),
+        "{found:#}"
+    );
     assert_eq!(found["kept"], serde_json::json!(["size-1x1"]), "{found:#}");
     assert_eq!(found["shown"], format!("1 of {}", report.cases.len()));
 }

@@ -50,7 +50,11 @@ fn every_effect_on_every_case_stores_the_same_numbers_everywhere() {
             }
         }
         let shadow = case.on("cpu-shadow").unwrap();
-        assert!(shadow.rounding.is_some() || is_off(&case.name), "{}", case.name);
+        assert!(
+            shadow.rounding.is_some() || is_off(&case.name),
+            "{}",
+            case.name
+        );
     }
 }
 
@@ -103,13 +107,19 @@ fn every_value_beyond_a_range_is_refused_with_an_error_that_says_so() {
     assert!(refusals.len() > 100, "{}", refusals.len());
     for refusal in &refusals {
         let error = refusal.error.as_ref().unwrap_or_else(|| {
-            panic!("{} takes {} = {}", refusal.effect, refusal.knob, refusal.value)
+            panic!(
+                "{} takes {} = {}",
+                refusal.effect, refusal.knob, refusal.value
+            )
         });
         assert!(error.contains(&refusal.effect), "{error}");
         assert!(error.contains(&refusal.knob), "{error}");
     }
     for effect in ["ssr", "bloom", "exposure", "composite", "chain"] {
-        assert!(refusals.iter().any(|refusal| refusal.effect == effect), "{effect}");
+        assert!(
+            refusals.iter().any(|refusal| refusal.effect == effect),
+            "{effect}"
+        );
     }
 }
 
@@ -131,7 +141,10 @@ fn what_is_not_there_is_said() {
         effects: vec!["blom".to_owned()],
         ..Options::default()
     });
-    assert!(unknown.contains("no effect `blom`") && unknown.contains("bloom"), "{unknown}");
+    assert!(
+        unknown.contains("no effect `blom`") && unknown.contains("bloom"),
+        "{unknown}"
+    );
     let unknown = error(Options {
         cases: vec!["no such case".to_owned()],
         ..Options::default()

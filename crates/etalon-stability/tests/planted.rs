@@ -26,7 +26,11 @@ fn kinds(report: &Report) -> Vec<FindingKind> {
 #[test]
 fn without_a_fault_nothing_is_found() {
     let report = planted(None);
-    assert!(report.is_sound(), "{:?}", report.findings().collect::<Vec<_>>());
+    assert!(
+        report.is_sound(),
+        "{:?}",
+        report.findings().collect::<Vec<_>>()
+    );
     assert_eq!(report.totals.findings, 0);
 }
 
@@ -37,7 +41,12 @@ fn a_nan_is_found_with_its_place() {
         fault: Fault::Nan,
     }));
     assert_eq!(kinds(&report), [FindingKind::NonFinite]);
-    let wrong = report.cases[0].on("cpu").unwrap().non_finite.as_ref().unwrap();
+    let wrong = report.cases[0]
+        .on("cpu")
+        .unwrap()
+        .non_finite
+        .as_ref()
+        .unwrap();
     assert_eq!((wrong.first.x, wrong.first.y, wrong.first.frame), (0, 0, 0));
     assert_eq!(wrong.first.pass, "ssr/march");
     assert_eq!(wrong.channels, 4);
@@ -50,8 +59,16 @@ fn an_error_of_a_hundredth_is_found() {
         fault: Fault::Error,
     }));
     assert_eq!(kinds(&report), [FindingKind::Rounding; 1]);
-    let wrong = report.cases[0].on("cpu-shadow").unwrap().rounding.as_ref().unwrap();
-    assert!(wrong.beyond >= 1 && wrong.max > 0.005 && wrong.max < 0.5, "{wrong:?}");
+    let wrong = report.cases[0]
+        .on("cpu-shadow")
+        .unwrap()
+        .rounding
+        .as_ref()
+        .unwrap();
+    assert!(
+        wrong.beyond >= 1 && wrong.max > 0.005 && wrong.max < 0.5,
+        "{wrong:?}"
+    );
 }
 
 /// A device is needed for something to differ from.
@@ -74,7 +91,12 @@ fn a_bit_is_found_on_a_device() {
             continue;
         }
         assert_eq!(kinds(&report), [FindingKind::Disagreement]);
-        let wrong = report.cases[0].on(kind.name()).unwrap().difference.as_ref().unwrap();
+        let wrong = report.cases[0]
+            .on(kind.name())
+            .unwrap()
+            .difference
+            .as_ref()
+            .unwrap();
         assert_eq!((wrong.texels, wrong.ulps), (1, 1));
         assert_eq!((wrong.first.x, wrong.first.y), (0, 0));
     }
@@ -87,12 +109,22 @@ fn program(arguments: &[&str]) -> (Option<i32>, String) {
         .output()
         .unwrap();
     let text = [output.stdout, output.stderr].concat();
-    (output.status.code(), String::from_utf8_lossy(&text).into_owned())
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
 }
 
 #[test]
 fn the_exit_status_tells_findings_from_faults_of_the_command() {
-    let few = ["--case", "size-5x5", "--effect", "ssr", "--executor", "cpu,cpu-shadow"];
+    let few = [
+        "--case",
+        "size-5x5",
+        "--effect",
+        "ssr",
+        "--executor",
+        "cpu,cpu-shadow",
+    ];
     let with = |more: &[&str]| program(&[&few[..], more].concat());
     let (status, text) = with(&[]);
     assert_eq!(status, Some(0), "{text}");
@@ -104,7 +136,10 @@ fn the_exit_status_tells_findings_from_faults_of_the_command() {
     ] {
         let (status, text) = with(&["--plant", fault]);
         assert_eq!(status, Some(1), "{fault}: {text}");
-        assert!(text.contains(said) && text.contains("size-5x5"), "{fault}: {text}");
+        assert!(
+            text.contains(said) && text.contains("size-5x5"),
+            "{fault}: {text}"
+        );
     }
     let (status, text) = program(&["--effect", "none"]);
     assert_eq!(status, Some(2), "{text}");
@@ -126,7 +161,10 @@ fn what_is_written_is_what_is_read() {
     let data: serde_json::Value = serde_json::from_str(&text).unwrap();
     let case = &data["cases"][0];
     for field in ["name", "effect", "reason", "source"] {
-        assert!(case[field].as_str().is_some_and(|text| !text.is_empty()), "{field}");
+        assert!(
+            case[field].as_str().is_some_and(|text| !text.is_empty()),
+            "{field}"
+        );
     }
     assert_eq!(case["results"].as_array().unwrap().len(), 3);
     assert_eq!(case["results"][0]["status"]["is"], "ran");

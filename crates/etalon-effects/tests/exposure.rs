@@ -271,6 +271,23 @@ fn black_white_and_unmeasurable_pictures_stay_in_range() {
     }
 }
 
+/// A first frame in which nothing is a number leaves nothing behind: the second is
+/// the first to adapt to. The darkest luminance in its place would be followed from
+/// there for seconds.
+#[test]
+fn a_first_frame_of_no_numbers_is_forgotten() {
+    let settings = Exposure::default();
+    for nothing in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut backend = backend();
+        let [none, factor] = frame(backend.as_mut(), &grey(nothing), 0.01, &settings);
+        assert_eq!(none, 0.0);
+        let darkest = settings.key / settings.min_luminance;
+        assert!((factor / darkest - 1.0).abs() <= 1e-6, "{factor}");
+        let [adapted, _] = frame(backend.as_mut(), &grey(0.5), 0.01, &settings);
+        assert!((adapted / 0.5 - 1.0).abs() <= 1e-6, "{adapted}");
+    }
+}
+
 #[test]
 fn compensation_is_in_stops() {
     let at = |compensation| {

@@ -106,7 +106,8 @@ fn texels_that_are_no_numbers_take_no_part() {
     let expected = (3.0 * 0.5 + 65_504.0) / 5.0;
     let average = measured.luminance.expect("finite");
     assert!((average / expected - 1.0).abs() <= 1e-14);
-    // None at all: what was before stays, and the first frame takes the darkest.
+    // None at all: what was before stays; the first frame is exposed as the darkest,
+    // and there is still none to be kept.
     let none = Plane::from_fn(3, 3, |_, _| [f64::NAN; 4]).expect("small");
     let settings = Exposure::default();
     let measured = measure(&none, &settings).expect("valid");
@@ -114,7 +115,16 @@ fn texels_that_are_no_numbers_take_no_part() {
     let kept = exposure(&none, Some(0.5), 1.0, &settings).expect("valid");
     assert_eq!(kept.luminance, 0.5);
     let first = exposure(&none, None, 1.0, &settings).expect("valid");
-    assert_eq!(first.luminance, f64::from(settings.min_luminance));
+    assert_eq!(first.luminance, 0.0);
+    let darkest = f64::from(settings.key) / f64::from(settings.min_luminance);
+    assert_eq!(first.factor, darkest);
+    let next = exposure(&grey_plane(0.5), Some(first.luminance), 0.01, &settings).expect("valid");
+    assert!((next.luminance - 0.5).abs() <= 1e-9, "{}", next.luminance);
+}
+
+/// Three texels square, of one grey.
+fn grey_plane(value: f64) -> Plane {
+    Plane::from_fn(3, 3, |_, _| [value, value, value, 1.0]).expect("small")
 }
 
 #[test]

@@ -22,6 +22,9 @@ pub enum Kind {
     /// The interpreter in `f32` with an `f64` shadow, which takes the decisions of
     /// the `f32`.
     Shadow,
+    /// The interpreter in fast arithmetic and `f32`, several times, each with its results
+    /// moved within what WGSL allows.
+    Perturbed,
     /// The interpreter in `f32`, followed by the numerical sanitiser.
     Sanitiser,
     /// wgpu on Vulkan.
@@ -32,11 +35,12 @@ pub enum Kind {
 
 impl Kind {
     /// All of them, in the order they are run in.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Cpu,
         Self::Double,
         Self::Shadow,
         Self::Sanitiser,
+        Self::Perturbed,
         Self::Wgpu,
         Self::Ash,
     ];
@@ -49,6 +53,7 @@ impl Kind {
             Self::Double => "cpu-f64",
             Self::Shadow => "cpu-shadow",
             Self::Sanitiser => "sanitiser",
+            Self::Perturbed => "perturbed",
             Self::Wgpu => "wgpu",
             Self::Ash => "ash",
         }
@@ -70,8 +75,8 @@ impl Kind {
     pub const fn arithmetics(self) -> &'static [Arithmetic] {
         match self {
             Self::Cpu => &[Arithmetic::Strict],
-            Self::Double => &[Arithmetic::Fast],
-            Self::Shadow | Self::Sanitiser | Self::Wgpu | Self::Ash => {
+            Self::Perturbed => &[Arithmetic::Fast],
+            Self::Double | Self::Shadow | Self::Sanitiser | Self::Wgpu | Self::Ash => {
                 &[Arithmetic::Strict, Arithmetic::Fast]
             }
         }
@@ -131,6 +136,11 @@ impl Executor {
             Kind::Cpu => interpreter(NumberType::F32)?,
             Kind::Double => interpreter(NumberType::F64)?,
             Kind::Shadow => interpreter(NumberType::Shadow)?,
+            Kind::Perturbed => CpuBackend::new(&CpuOptions {
+                perturbs: true,
+                ..CpuOptions::default()
+            })
+            .map(|backend| Backing::Interpreter(Box::new(backend)))?,
             Kind::Sanitiser => CpuBackend::new(&CpuOptions {
                 sanitise: true,
                 ..CpuOptions::default()
@@ -168,6 +178,13 @@ impl Executor {
         match &mut self.backing {
             Backing::Interpreter(backend) => backend.reset_histories(),
             Backing::Device(backend) => backend.reset_histories(),
+        }
+    }
+
+    /// Becomes another device that WGSL allows, or none; of [`Kind::Perturbed`].
+    pub fn perturb(&mut self, seed: Option<u64>) {
+        if let Backing::Interpreter(backend) = &mut self.backing {
+            backend.set_perturbation(seed);
         }
     }
 

@@ -12,6 +12,7 @@
 //!
 //! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
+//! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
 //! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
@@ -38,6 +39,7 @@
 
 pub mod executors;
 pub mod judge;
+pub mod kernels;
 pub mod knobs;
 pub mod model;
 pub mod observe;

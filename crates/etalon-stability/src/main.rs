@@ -9,7 +9,7 @@ use clap::Parser;
 use etalon_stability::executors::Kind;
 use etalon_stability::plant::Plant;
 use etalon_stability::run::{Options, Progress, run};
-use etalon_stability::{report, table};
+use etalon_stability::{kernels, report, table};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs every effect on a corpus of hard cases, on every backend: are all results
@@ -29,7 +29,7 @@ struct Arguments {
     #[arg(
         long,
         value_delimiter = ',',
-        default_value = "cpu,cpu-f64,cpu-shadow,sanitiser,wgpu,ash"
+        default_value = "cpu,cpu-f64,cpu-shadow,sanitiser,perturbed,wgpu,ash"
     )]
     executor: Vec<Kind>,
     /// Most texels of a frame; larger cases are left out.
@@ -41,6 +41,9 @@ struct Arguments {
     /// Write everything found to this file.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Take kernels from this folder in place of those built in, to try a formula.
+    #[arg(long)]
+    kernels: Option<PathBuf>,
     /// Plant a fault to be found, as `wgpu:nan`, `ash:bit` or `cpu-shadow:error`.
     #[arg(long, hide = true)]
     plant: Option<Plant>,
@@ -62,11 +65,16 @@ impl Progress for Shown {
 
 impl Arguments {
     fn run(self) -> Result<bool, String> {
+        let kernels = match &self.kernels {
+            Some(folder) => kernels::of_folder(folder).map_err(|error| error.to_string())?,
+            None => Vec::new(),
+        };
         let options = Options {
             cases: self.case,
             effects: self.effect,
             executors: self.executor,
             largest: self.largest,
+            kernels,
             plant: self.plant,
         };
         // The template is a constant that is right.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::judge::agreement::Difference;
 use crate::judge::finite::NonFinite;
 use crate::judge::rounding::Rounding;
+use crate::judge::spread::{Outside, Width};
 use crate::sanitise;
 
 /// Everything that a run found.
@@ -175,9 +176,10 @@ pub struct ExecutorResult {
     pub difference: Option<Difference>,
     /// How far `f32` is from `f64`; of the shadow.
     pub rounding: Option<Rounding>,
-    /// Texels that come out otherwise where `f64` decides for itself; of the `f64`
-    /// run beside the shadow's.
-    pub decided_otherwise: Option<u64>,
+    /// How far perturbed executions are from each other; of those.
+    pub spread: Option<Width>,
+    /// Where fast arithmetic is outside of what they allow; of devices.
+    pub outside: Option<Outside>,
     /// What the sanitiser counted; of the sanitiser.
     pub sanitised: Option<sanitise::Counts>,
 }
@@ -192,6 +194,8 @@ pub enum FindingKind {
     Disagreement,
     /// `f32` is too far from `f64`.
     Rounding,
+    /// A device's fast arithmetic is outside of what perturbed executions allow.
+    Outside,
     /// A kernel gave birth to a NaN or infinity.
     Birth,
     /// A kernel stores what rounding has made inaccurate.

@@ -14,6 +14,7 @@ use etalon_scenes::cases::{Step, case};
 use thiserror::Error;
 
 use crate::executors::{Executor, Kind};
+use crate::judge::spread::{PERTURBATIONS, Spread};
 use crate::judge::{agreement, finite, recovery, rounding};
 use crate::knobs;
 use crate::model::{
@@ -38,6 +39,8 @@ pub struct Options {
     /// Most texels of a case's frame; larger cases are left out. All are run
     /// without it.
     pub largest: Option<usize>,
+    /// Kernels in place of those built in: see [`kernels`](crate::kernels).
+    pub kernels: Vec<(String, String)>,
     /// A fault to be found.
     pub plant: Option<Plant>,
 }
@@ -49,6 +52,7 @@ impl Default for Options {
             effects: Vec::new(),
             executors: Kind::ALL.to_vec(),
             largest: None,
+            kernels: Vec::new(),
             plant: None,
         }
     }
@@ -132,8 +136,11 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let chosen = choose(options)?;
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
-    let kernels = KernelLibrary::new();
     let mut watch = Watch::new()?;
+    let mut kernels = KernelLibrary::new();
+    for (path, text) in &options.kernels {
+        kernels.add_source(path, text);
+    }
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
     let mut named = std::collections::BTreeSet::new();
     for (subject, effects) in &chosen {
@@ -263,6 +270,25 @@ struct Pair<'a> {
 /// What all frames of a case stored.
 type Frames = Vec<Vec<Store>>;
 
+/// What later executors are held to.
+#[derive(Default)]
+struct Kept {
+    /// What the interpreter stored.
+    reference: Frames,
+    /// What it stored in `f64`, in each arithmetic.
+    double: Vec<(Arithmetic, Frames)>,
+    /// How far perturbed executions are from each other in fast arithmetic, by frame.
+    spread: Vec<Spread>,
+}
+
+impl Kept {
+    /// What was stored in `f64`.
+    fn double(&self, arithmetic: Arithmetic) -> Option<&Frames> {
+        let mut known = self.double.iter();
+        known.find_map(|(known, frames)| (*known == arithmetic).then_some(frames))
+    }
+}
+
 impl Pair<'_> {
     fn run(&self, executors: &mut [Executor], watch: &mut Watch) -> CaseReport {
         let Self {
@@ -294,24 +320,20 @@ impl Pair<'_> {
             }),
             ..CaseReport::default()
         };
-        let mut reference = None;
-        let mut double = None;
+        let mut kept = Kept::default();
         for executor in executors {
-            let found = &mut report.findings;
-            let result = self.on(executor, watch, &mut reference, &mut double, found);
+            let result = self.on(executor, watch, &mut kept, &mut report.findings);
             report.results.push(result);
         }
         report
     }
 
-    /// Runs it on one executor. What the interpreter stored is kept in `reference`
-    /// for devices, what it stored in `f64` in `double` for the shadow.
+    /// Runs it on one executor, and keeps what others are held to.
     fn on(
         &self,
         executor: &mut Executor,
         watch: &mut Watch,
-        reference: &mut Option<Frames>,
-        double: &mut Option<Frames>,
+        kept: &mut Kept,
         findings: &mut Vec<Finding>,
     ) -> ExecutorResult {
         let kind = executor.kind;
@@ -341,41 +363,53 @@ impl Pair<'_> {
             for (number, stores) in frames.iter().enumerate() {
                 result.stores += stores.len();
                 finite::look(number, stores, &mut result.non_finite);
-                if kind == Kind::Shadow {
-                    errors.look(number, stores);
-                }
             }
             match kind {
                 Kind::Cpu => {
                     if let Some(finding) = self.recovery(executor, &frames) {
                         findings.push(finding);
                     }
-                    *reference = Some(frames);
+                    kept.reference = frames;
                 }
-                Kind::Double => *double = Some(frames),
-                Kind::Shadow if arithmetic == Arithmetic::Fast => {
-                    let pairs = frames.iter().zip(double.iter().flatten());
-                    result.decided_otherwise = double.is_some().then(|| {
-                        pairs
-                            .map(|(shadow, double)| rounding::decided_otherwise(shadow, double))
-                            .sum()
-                    });
+                Kind::Double => kept.double.push((arithmetic, frames)),
+                Kind::Shadow => {
+                    let double = kept.double(arithmetic);
+                    for (number, stores) in frames.iter().enumerate() {
+                        let double = double.and_then(|frames| frames.get(number));
+                        let double = double.map_or(&[][..], Vec::as_slice);
+                        errors.look(number, stores, double, arithmetic == Arithmetic::Strict);
+                    }
                 }
-                Kind::Shadow => {}
                 Kind::Sanitiser => {
                     let steps = executor.take_sanitised();
                     let counts = result.sanitised.get_or_insert_default();
                     let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name);
                     findings.extend(watch.look(&case, &steps, self.expected(), counts));
-                    self.effects(arithmetic, &steps, &frames, double.as_ref(), counts);
+                    decisions(&steps, &frames, kept.double(arithmetic), counts);
+                }
+                Kind::Perturbed => {
+                    kept.spread = frames.iter().map(|stores| Spread::around(stores)).collect();
+                    for seed in 0..PERTURBATIONS {
+                        executor.perturb(Some(seed));
+                        let moved = self.execute(executor, self.steps, arithmetic, &mut result);
+                        for (spread, stores) in kept.spread.iter_mut().zip(moved.iter().flatten()) {
+                            spread.widen(stores);
+                        }
+                    }
+                    executor.perturb(None);
+                    result.spread = Some(Spread::summary(&kept.spread));
                 }
                 Kind::Wgpu | Kind::Ash if arithmetic == Arithmetic::Strict => {
-                    let pairs = reference.iter().flatten().zip(&frames);
+                    let pairs = kept.reference.iter().zip(&frames);
                     for (number, (reference, subject)) in pairs.enumerate() {
                         agreement::compare(number, reference, subject, &mut result.difference);
                     }
                 }
-                Kind::Wgpu | Kind::Ash => {}
+                Kind::Wgpu | Kind::Ash => {
+                    for (number, (spread, stores)) in kept.spread.iter().zip(&frames).enumerate() {
+                        spread.compare(number, stores, &mut result.outside);
+                    }
+                }
             }
         }
         if kind == Kind::Shadow {
@@ -392,26 +426,6 @@ impl Pair<'_> {
             .filter(|known| known.effect == self.effect.name)
             .map(|known| known.bound)
             .next()
-    }
-
-    /// What decisions that are not stable do to what is stored: `f64` was run in fast
-    /// arithmetic, so that is when it can be told. Steps are those of all frames.
-    fn effects(
-        &self,
-        arithmetic: Arithmetic,
-        steps: &[StepSanitised],
-        frames: &Frames,
-        double: Option<&Frames>,
-        counts: &mut Counts,
-    ) {
-        let Some(double) = double.filter(|_| arithmetic == Arithmetic::Fast) else {
-            return;
-        };
-        let each = steps.len() / frames.len().max(1);
-        let chunks = steps.chunks(each.max(1));
-        for ((steps, single), double) in chunks.zip(frames).zip(double) {
-            counts.compare(steps, single, double);
-        }
     }
 
     /// Runs the frames in a row from a fresh history.
@@ -470,6 +484,9 @@ impl Pair<'_> {
     /// replaced by the one after it.
     fn recovery(&self, executor: &mut Executor, faulty: &[Vec<Store>]) -> Option<Finding> {
         let recovery = self.subject.recovery?;
+        if recovery.effect != self.effect.name {
+            return None;
+        }
         let mut steps = self.steps.to_vec();
         let good = steps.get(recovery.poisoned + 1)?.clone();
         *steps.get_mut(recovery.poisoned)? = good;
@@ -494,6 +511,21 @@ impl Pair<'_> {
             place.frame - recovery.poisoned,
             recovery.poisoned
         )))
+    }
+}
+
+/// What decisions that are not stable do to what is stored. Steps are those of all
+/// frames.
+fn decisions(
+    steps: &[StepSanitised],
+    frames: &Frames,
+    double: Option<&Frames>,
+    counts: &mut Counts,
+) {
+    let each = (steps.len() / frames.len().max(1)).max(1);
+    let pairs = frames.iter().zip(double.into_iter().flatten());
+    for (steps, (single, double)) in steps.chunks(each).zip(pairs) {
+        counts.compare(steps, single, double);
     }
 }
 
@@ -523,6 +555,16 @@ fn conclusions(result: &ExecutorResult) -> Vec<Finding> {
             format!(
                 "{} texels differ, the first: {}, {:e} in place of {:e}",
                 wrong.texels, wrong.first, wrong.subject, wrong.reference
+            ),
+        ));
+    }
+    if let Some(wrong) = &result.outside {
+        found.push(finding(
+            FindingKind::Outside,
+            format!(
+                "{} texels are outside of what perturbed executions allow, where {} may be, the first: {}, {:e}, \
+                 not within {:e} of {:e}",
+                wrong.texels, wrong.tolerated, wrong.first, wrong.subject, wrong.allowed, wrong.centre
             ),
         ));
     }

@@ -116,7 +116,7 @@ fn rows(out: &mut String, report: &Report) {
     for case in cases {
         let shadow = case.results.iter().find(|one| one.rounding.is_some());
         let rounding = shadow.and_then(|one| one.rounding.as_ref());
-        let otherwise = shadow.and_then(|one| one.decided_otherwise);
+        let otherwise = rounding.map(|one| one.otherwise);
         let counts = case.results.iter().find_map(|one| one.sanitised);
         let unstable = counts.map(|one| one.unstable_branches + one.unstable_indices);
         let _ = writeln!(

@@ -53,8 +53,9 @@ pub struct CpuOptions {
     /// resources hold, so that results are bit by bit those of `f32`. Passes that draw
     /// are not followed.
     pub sanitise: bool,
-    /// See [`Executor::with_perturbation`]; of compute passes.
-    pub perturbation: Option<u64>,
+    /// Whether results of compute passes can be moved within what WGSL allows, see
+    /// [`CpuBackend::set_perturbation`].
+    pub perturbs: bool,
 }
 
 impl Default for CpuOptions {
@@ -68,7 +69,7 @@ impl Default for CpuOptions {
             number_type: NumberType::F32,
             checks: Checks::NONE,
             sanitise: false,
-            perturbation: None,
+            perturbs: false,
         }
     }
 }
@@ -111,7 +112,6 @@ impl CpuBackend {
             } else {
                 options.number_type
             })
-            .with_perturbation(options.perturbation)
             .with_tier(options.tier.unwrap_or_else(Tier::best));
         Ok(Self {
             executor,
@@ -124,7 +124,7 @@ impl CpuBackend {
             findings: Findings::default(),
             sanitise: options.sanitise,
             sanitised: Vec::new(),
-            perturbs: options.perturbation.is_some(),
+            perturbs: options.perturbs,
         })
     }
 
@@ -156,6 +156,13 @@ impl CpuBackend {
     /// What was found so far, which is forgotten.
     pub fn take_findings(&mut self) -> Findings {
         std::mem::take(&mut self.findings)
+    }
+
+    /// From now on another device that WGSL allows, or none: see
+    /// [`Executor::with_perturbation`]. Of no effect unless [`CpuOptions::perturbs`] was
+    /// set.
+    pub fn set_perturbation(&mut self, seed: Option<u64>) {
+        self.executor.set_perturbation(seed);
     }
 
     /// What the sanitiser found in the compute passes since this was last asked, in the

@@ -153,8 +153,13 @@ impl Executor {
     /// number types lose what they have beyond it.
     #[must_use]
     pub fn with_perturbation(mut self, seed: Option<u64>) -> Self {
-        self.perturbation = seed;
+        self.set_perturbation(seed);
         self
+    }
+
+    /// See [`Executor::with_perturbation`].
+    pub(crate) fn set_perturbation(&mut self, seed: Option<u64>) {
+        self.perturbation = seed;
     }
 
     /// The instruction set in use.

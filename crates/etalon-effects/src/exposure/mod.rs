@@ -175,7 +175,9 @@ pub fn measure(
 ///
 /// `delta_time` is the time since the last frame in seconds, in `[0, 1e6]`. The
 /// result is one texel of `rgba32float`: the luminance adapted to, and the factor
-/// that brings it to `key`. It is kept as the history [`HISTORY`].
+/// that brings it to `key`. It is kept as the history [`HISTORY`]. As long as no frame
+/// had a finite texel the luminance is 0, which is none, and the factor that of the
+/// darkest.
 ///
 /// # Errors
 /// If a setting or `delta_time` is out of range.

@@ -29,7 +29,8 @@ pub struct Measured {
 /// What the eye sees after a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
-    /// The luminance adapted to, from `min_luminance` to `max_luminance`.
+    /// The luminance adapted to, from `min_luminance` to `max_luminance`; 0, which is
+    /// none, where nothing was measured and nothing was held.
     pub luminance: f64,
     /// The factor on the light that brings it to the key.
     pub factor: f64,
@@ -71,7 +72,8 @@ pub fn measure(colour: &Plane, settings: &Exposure) -> Result<Measured, EffectEr
 ///
 /// A `previous` that is no positive number is none, as before the first frame:
 /// the average is then adapted to at once. Where nothing was measured, nothing
-/// changes.
+/// changes: where nothing was held either there is none to adapt to, and the light
+/// is exposed as the darkest that is adapted to.
 ///
 /// # Errors
 /// If a setting is out of range or `delta_time` is not from 0 to 10⁶.
@@ -108,8 +110,9 @@ pub fn adapt(
         previous - (wanted - previous) * (-f64::from(speed) * delta_time).exp_m1()
     });
     let key = f64::from(settings.key) * f64::from(settings.compensation).exp2();
+    let known = measured.is_some() || previous.is_some();
     Ok(Adapted {
-        luminance,
+        luminance: if known { luminance } else { 0.0 },
         factor: key / luminance,
     })
 }

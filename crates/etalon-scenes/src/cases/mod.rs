@@ -128,9 +128,11 @@ pub struct Expected {
     pub reason: &'static str,
 }
 
-/// Which effects may differ after a fault in an early frame, and for how long.
+/// For how long a fault in one frame may show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Recovery {
+    /// The effect whose history must not keep it.
+    pub effect: &'static str,
     /// The frame that is at fault.
     pub poisoned: usize,
     /// Frames after it from which on the results are those without the fault.
@@ -194,7 +196,11 @@ impl Case {
     /// With a fault in a frame.
     const fn recovering(self, poisoned: usize, frames: usize) -> Self {
         Self {
-            recovery: Some(Recovery { poisoned, frames }),
+            recovery: Some(Recovery {
+                effect: "exposure",
+                poisoned,
+                frames,
+            }),
             ..self
         }
     }

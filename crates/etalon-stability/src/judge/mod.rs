@@ -5,3 +5,4 @@ pub mod finite;
 pub mod recovery;
 pub mod rounding;
 pub mod scale;
+pub mod spread;

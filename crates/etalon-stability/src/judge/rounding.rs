@@ -1,9 +1,17 @@
 //! How far is `f32` from `f64`?
 //!
-//! The shadow is the `f64` that takes the same decisions as the `f32` beside it, so
+//! The shadow is the `f64` that takes the same branches as the `f32` beside it, so
 //! that what is left is rounding. Its error at a store is the distance between what
 //! was stored and the shadow, less the half step that storing to the format may move
-//! it, relative to the shadow or to the channel's [scale](super::scale).
+//! it, relative to the shadow or to the channel's [scale](super::scale). Where a
+//! strict kernel has rounded to whole codes itself, so has its shadow: a half step
+//! each.
+//!
+//! Branches are not the only decisions. A texel's coordinate is a whole number, and
+//! where `f32` and `f64` round to different ones the shadow reads one texel by the
+//! weight of another: its value is none. There the `f64` run that decides for itself
+//! says otherwise than the shadow, and the texel is counted apart
+//! ([`Rounding::otherwise`]).
 //!
 //! Allowed is [`BOUND`], 2⁻¹¹, from which on an error shows in half floats, and what
 //! stores of fewer bits in earlier passes of the frame have left: half a unit of
@@ -38,6 +46,8 @@ pub struct Rounding {
     pub beyond: u64,
     /// Texels looked at.
     pub texels: u64,
+    /// Texels left out: those that come out otherwise where `f64` decides for itself.
+    pub otherwise: u64,
 }
 
 impl Rounding {
@@ -75,10 +85,12 @@ impl Gathering {
         }
     }
 
-    /// Takes a frame's stores with their shadows.
-    pub fn look(&mut self, frame: usize, stores: &[Store]) {
+    /// Takes a frame's stores with their shadows, and those of the `f64` run that
+    /// decides for itself, if there was one. `quantised` if kernels round to whole
+    /// codes themselves.
+    pub fn look(&mut self, frame: usize, stores: &[Store], double: &[Store], quantised: bool) {
         let mut inherited = 0.0;
-        for store in stores {
+        for (number, store) in stores.iter().enumerate() {
             let (Some(image), Some(wide)) = (&store.image, &store.wide) else {
                 continue;
             };
@@ -90,12 +102,19 @@ impl Gathering {
                 arithmetic_mean: self.arithmetic_mean,
             };
             let allowed = self.bound + inherited;
+            let steps = if quantised { 2.0 } else { 1.0 };
+            let alone = double.get(number).and_then(|double| double.wide.as_ref());
             let bytes = image.bytes.chunks_exact(format.texel_bytes() as usize);
             for (index, (bytes, exact)) in bytes.zip(wide).enumerate() {
-                let stored = format.decode(bytes).to_f64();
-                let (error, channel) = texel_error(&place, &stored, exact);
-                self.errors.push(error as f32);
                 self.found.texels += 1;
+                let alone = alone.and_then(|alone| alone.get(index));
+                if alone.is_some_and(|alone| differ(&place, alone, exact)) {
+                    self.found.otherwise += 1;
+                    continue;
+                }
+                let stored = format.decode(bytes).to_f64();
+                let (error, channel) = texel_error(&place, &stored, exact, steps);
+                self.errors.push(error as f32);
                 if !(error <= allowed) {
                     self.found.beyond += 1;
                 }
@@ -125,9 +144,20 @@ impl Gathering {
     }
 }
 
-/// The largest error of a texel's channels, and which it is; infinite where one is
-/// a number and the other none.
-fn texel_error(place: &scale::Place<'_>, stored: &[f64; 4], exact: &[f64; 4]) -> (f64, usize) {
+/// Whether two `f64` runs are further apart than rounding to the format and what is
+/// inherited explain: they have taken different decisions.
+fn differ(place: &scale::Place<'_>, a: &[f64; 4], b: &[f64; 4]) -> bool {
+    !(texel_error(place, a, b, 1.0).0 <= BOUND + place.inherited)
+}
+
+/// The largest error of a texel's channels beyond so many half steps of the format,
+/// and which it is; infinite where one is a number and the other none.
+fn texel_error(
+    place: &scale::Place<'_>,
+    stored: &[f64; 4],
+    exact: &[f64; 4],
+    steps: f64,
+) -> (f64, usize) {
     let mut worst = (0.0, 0);
     for channel in 0..place.format.channels() as usize {
         let (stored, value) = (stored[channel], exact[channel]);
@@ -135,7 +165,7 @@ fn texel_error(place: &scale::Place<'_>, stored: &[f64; 4], exact: &[f64; 4]) ->
         let distance = (stored - value).abs();
         let scale = place.scale(channel, exact).max(value.abs());
         let error = if distance.is_finite() {
-            (distance - step).max(0.0) / scale
+            (distance - steps * step).max(0.0) / scale
         } else {
             f64::INFINITY
         };
@@ -144,29 +174,4 @@ fn texel_error(place: &scale::Place<'_>, stored: &[f64; 4], exact: &[f64; 4]) ->
         }
     }
     worst
-}
-
-/// Texels of a frame that come out otherwise where `f64` decides for itself: where
-/// two executors' wide values are further apart than rounding and storage explain.
-#[must_use]
-pub fn decided_otherwise(shadow: &[Store], double: &[Store]) -> u64 {
-    let mut inherited = 0.0;
-    let mut count = 0;
-    for (shadow, double) in shadow.iter().zip(double) {
-        let (Some(image), Some(a), Some(b)) = (&shadow.image, &shadow.wide, &double.wide) else {
-            continue;
-        };
-        let place = scale::Place {
-            pass: &shadow.pass,
-            format: image.desc.format,
-            inherited,
-            arithmetic_mean: false,
-        };
-        let texels = a.iter().zip(b);
-        count += texels
-            .filter(|(a, b)| !(texel_error(&place, a, b).0 <= BOUND + inherited))
-            .count() as u64;
-        inherited += scale::unit(image.desc.format);
-    }
-    count
 }

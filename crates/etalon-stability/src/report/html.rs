@@ -90,8 +90,8 @@ fn row(body: &mut String, case: &CaseReport) {
     let shadow = case.results.iter().find(|one| one.rounding.is_some());
     let rounding = shadow.and_then(|one| one.rounding.as_ref());
     let figure = |error: Option<f64>| error.map_or_else(|| "–".to_owned(), power);
-    let otherwise = shadow
-        .and_then(|one| one.decided_otherwise)
+    let otherwise = rounding
+        .map(|one| one.otherwise)
         .map_or_else(|| "–".to_owned(), |count| count.to_string());
     let _ = write!(
         body,

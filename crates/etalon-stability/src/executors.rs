@@ -7,7 +7,7 @@ use etalon_ash::{AshBackend, AshOptions, Validation};
 use etalon_core::backend::{Backend, BackendError, BackendInfo, Inputs};
 use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::Plan;
-use etalon_cpu::{CpuBackend, CpuOptions, NumberType, StepSanitised};
+use etalon_cpu::{Checks, CpuBackend, CpuOptions, NumberType, StepFinding, StepSanitised};
 use etalon_wgpu::{WgpuBackend, WgpuOptions, wgpu::Backends};
 
 use crate::observe::{ObserveError, Store, stores, wide_stores};
@@ -101,6 +101,14 @@ impl FromStr for Kind {
     }
 }
 
+/// What is watched for beside numbers. Births of NaN and infinities are the sanitiser's.
+const CHECKS: Checks = Checks {
+    uninitialised: false,
+    races: false,
+    non_finite: false,
+    ..Checks::all()
+};
+
 enum Backing {
     Interpreter(Box<CpuBackend>),
     Device(Box<dyn Backend>),
@@ -143,6 +151,7 @@ impl Executor {
             .map(|backend| Backing::Interpreter(Box::new(backend)))?,
             Kind::Sanitiser => CpuBackend::new(&CpuOptions {
                 sanitise: true,
+                checks: CHECKS,
                 ..CpuOptions::default()
             })
             .map(|backend| Backing::Interpreter(Box::new(backend)))?,
@@ -185,6 +194,14 @@ impl Executor {
     pub fn perturb(&mut self, seed: Option<u64>) {
         if let Backing::Interpreter(backend) = &mut self.backing {
             backend.set_perturbation(seed);
+        }
+    }
+
+    /// What the interpreter's checks found since this was last asked.
+    pub fn take_checked(&mut self) -> Vec<StepFinding> {
+        match &mut self.backing {
+            Backing::Interpreter(backend) => backend.take_findings().list,
+            Backing::Device(_) => Vec::new(),
         }
     }
 

@@ -15,6 +15,7 @@
 //! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
 //! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
+//! * [`mutate`]: whether anything is found where a kernel's guard is missing;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
 //! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
 //!
@@ -42,6 +43,7 @@ pub mod judge;
 pub mod kernels;
 pub mod knobs;
 pub mod model;
+pub mod mutate;
 pub mod observe;
 pub mod plant;
 pub mod report;

@@ -9,7 +9,7 @@ use clap::Parser;
 use etalon_stability::executors::Kind;
 use etalon_stability::plant::Plant;
 use etalon_stability::run::{Options, Progress, run};
-use etalon_stability::{kernels, report, table};
+use etalon_stability::{kernels, mutate, report, table};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs every effect on a corpus of hard cases, on every backend: are all results
@@ -44,6 +44,11 @@ struct Arguments {
     /// Take kernels from this folder in place of those built in, to try a formula.
     #[arg(long)]
     kernels: Option<PathBuf>,
+    /// Take the guards of kernels away, one at a time, and see whether anything is found:
+    /// takes a quarter of an hour, on frames of up to 4096 texels unless `--largest` says
+    /// otherwise.
+    #[arg(long)]
+    mutate: bool,
     /// Plant a fault to be found, as `wgpu:nan`, `ash:bit` or `cpu-shadow:error`.
     #[arg(long, hide = true)]
     plant: Option<Plant>,
@@ -65,6 +70,17 @@ impl Progress for Shown {
 
 impl Arguments {
     fn run(self) -> Result<bool, String> {
+        if self.mutate {
+            let shown = ProgressBar::no_length();
+            let mutants = mutate::mutate(self.largest.unwrap_or(4096), |done, of| {
+                shown.set_length(of as u64);
+                shown.set_position(done as u64);
+            });
+            shown.finish_and_clear();
+            let mutants = mutants.map_err(|error| error.to_string())?;
+            print!("{}", mutate::table(&mutants));
+            return Ok(mutants.iter().all(|mutant| mutant.failed > 0));
+        }
         let kernels = match &self.kernels {
             Some(folder) => kernels::of_folder(folder).map_err(|error| error.to_string())?,
             None => Vec::new(),

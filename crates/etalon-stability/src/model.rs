@@ -170,6 +170,8 @@ pub struct ExecutorResult {
     pub executions: u64,
     /// Captures looked at.
     pub stores: usize,
+    /// Of all bits stored: equal in runs that stored the same. Of the interpreter.
+    pub digest: Option<u64>,
     /// What is no number.
     pub non_finite: Option<NonFinite>,
     /// Where it is not the interpreter's bits; of devices.
@@ -200,6 +202,9 @@ pub enum FindingKind {
     Birth,
     /// A kernel stores what rounding has made inaccurate.
     Inaccurate,
+    /// The interpreter's checks saw an access out of bounds, an endless loop, a division
+    /// by zero or the like.
+    Check,
     /// A fault in one frame shows longer than it may.
     Recovery,
     /// It could not be run.

@@ -369,6 +369,7 @@ impl Pair<'_> {
                     if let Some(finding) = self.recovery(executor, &frames) {
                         findings.push(finding);
                     }
+                    result.digest = Some(digest(&frames));
                     kept.reference = frames;
                 }
                 Kind::Double => kept.double.push((arithmetic, frames)),
@@ -381,6 +382,11 @@ impl Pair<'_> {
                     }
                 }
                 Kind::Sanitiser => {
+                    findings.extend(executor.take_checked().into_iter().map(|found| Finding {
+                        kind: FindingKind::Check,
+                        executor: kind.to_string(),
+                        text: found.to_string(),
+                    }));
                     let steps = executor.take_sanitised();
                     let counts = result.sanitised.get_or_insert_default();
                     let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name);
@@ -512,6 +518,18 @@ impl Pair<'_> {
             recovery.poisoned
         )))
     }
+}
+
+/// A number for all bits stored: FNV-1a (G. Fowler, L. C. Noll and K.-P. Vo, 1991).
+fn digest(frames: &Frames) -> u64 {
+    let stores = frames.iter().flatten();
+    let bytes = stores.flat_map(|store| {
+        let image = store.image.as_ref().map_or(&[][..], |image| &image.bytes);
+        image.iter().chain(store.buffer.iter().flatten())
+    });
+    bytes.fold(0xcbf2_9ce4_8422_2325, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3)
+    })
 }
 
 /// What decisions that are not stable do to what is stored. Steps are those of all

@@ -17,6 +17,8 @@ use etalon_cpu::Location;
 use etalon_cpu::sanitise::Fault;
 use thiserror::Error;
 
+use crate::mutate;
+
 /// What begins such a comment.
 const MARK: &str = "// sanitiser allows ";
 
@@ -106,8 +108,8 @@ impl Allowances {
             if on_its_own {
                 at = index + 1;
                 while let Some(more) = lines.get(at).and_then(|line| comment(line)) {
-                    if lines[at].contains(MARK) {
-                        // Another one for the same line.
+                    if lines[at].contains(MARK) || lines[at].contains(mutate::MARK) {
+                        // Another one for the same line, or another purpose.
                         at += 1;
                         continue;
                     }

@@ -8,7 +8,7 @@ use super::probe::{Scalar, Twin, ulp};
 use super::state::State;
 use super::tier::Step;
 use crate::ir::{Arith, Op, Perturbed};
-use crate::num::Number;
+use crate::num::{Number, f16_to_f32, f32_to_f16};
 use crate::registers::LANES;
 
 /// A result is moved by the same amount wherever the same operands meet at the same
@@ -67,6 +67,9 @@ enum Allowed {
     Ulps(f64),
     /// So much.
     Absolute(f64),
+    /// Either neighbour among the numbers of binary16 (Vulkan, "Conversion to Floating
+    /// Point" of stores: the rounding is the device's).
+    HalfNeighbours,
     /// Nothing.
     Exact,
 }
@@ -87,6 +90,7 @@ fn allowed(op: Arith, operands: &[Scalar]) -> Allowed {
     match op {
         A::AddF | A::SubF | A::MulF | A::LdexpF => Allowed::Neighbours,
         A::MulAddF | A::MulSubF | A::SubMulF | A::SToF | A::UToF => Allowed::Neighbours,
+        A::RoundHalf => Allowed::HalfNeighbours,
         A::DivF => Allowed::Ulps(2.5),
         // x - y * trunc(x / y), where that keeps its integer.
         A::RemF => Allowed::Neighbours,
@@ -125,6 +129,9 @@ impl Perturbed {
             .len()
             .min(if self.product.is_some() { 2 } else { 4 })];
         let allowed = allowed(self.op, own);
+        if allowed == Allowed::HalfNeighbours {
+            return half_neighbour(result, random.coin());
+        }
         let (exact, _) = twin.of_singles(own);
         if allowed == Allowed::Exact || !result.is_finite() || !exact.is_finite() {
             return result;
@@ -148,7 +155,7 @@ impl Perturbed {
             Allowed::Neighbours => neighbour(exact, random.coin()),
             Allowed::Ulps(ulps) => (exact + ulps * ulp(exact) * random.signed()) as f32,
             Allowed::Absolute(error) => (exact + error * random.signed()) as f32,
-            Allowed::Exact => result,
+            Allowed::HalfNeighbours | Allowed::Exact => result,
         };
         if !moved.is_finite() {
             return result;
@@ -186,6 +193,23 @@ fn neighbour(exact: f64, up: bool) -> f32 {
         Some(Ordering::Greater) if !up => nearest.next_down(),
         _ => nearest,
     }
+}
+
+/// A number of binary16 next to a number, the nearer or the farther one.
+fn half_neighbour(value: f32, nearer: bool) -> f32 {
+    let bits = f32_to_f16(value);
+    let nearest = f16_to_f32(bits);
+    if nearer || nearest == value || !nearest.is_finite() {
+        return value;
+    }
+    // Magnitudes are in the order of their bits.
+    let outwards = nearest.abs() < value.abs();
+    let other = f16_to_f32(if outwards {
+        bits + 1
+    } else {
+        bits.saturating_sub(1)
+    });
+    if other.is_finite() { other } else { value }
 }
 
 /// A sequence that depends on nothing but where it began: SplitMix64 (G. Steele et al.,
@@ -289,6 +313,23 @@ mod tests {
             .collect();
         assert!(seen.contains(&x.mul_add(y, -1.0).to_bits()));
         assert!(seen.contains(&(product - 1.0).to_bits()));
+    }
+
+    #[test]
+    fn stores_of_halves_become_either_neighbour() {
+        for value in [0.1_f32, -0.1, 1000.3, 6e-8, 65_503.0] {
+            let (near, far) = (half_neighbour(value, true), half_neighbour(value, false));
+            assert_eq!(near, value, "rounded to nearest when it is stored");
+            let nearest = f16_to_f32(f32_to_f16(value));
+            assert_eq!(far, f16_to_f32(f32_to_f16(far)), "{value}");
+            assert!(
+                (far - value) * (nearest - value) <= 0.0,
+                "{value}: {nearest}, {far}"
+            );
+            assert!((far - nearest).abs() <= nearest.abs().max(6e-5) / 1000.0);
+        }
+        assert_eq!(half_neighbour(0.5, false), 0.5);
+        assert_eq!(half_neighbour(1e9, false), 1e9);
     }
 
     #[test]

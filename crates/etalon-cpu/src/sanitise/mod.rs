@@ -96,8 +96,8 @@ pub struct Site {
     /// What 99 % of errors are at most, in the same units: a bound that is less than
     /// √2 too large.
     pub p99_ulps: f64,
-    /// The largest relative error; where the exact result is subnormal, relative to
-    /// the least normal number. At a store relative to what the format can tell
+    /// The largest relative error: relative to the larger of the two results, or to the
+    /// least normal number if that is more. At a store relative to what the format can tell
     /// apart, if that is more: see [`Site::floor`].
     pub max_relative: f64,
     /// Where that was.

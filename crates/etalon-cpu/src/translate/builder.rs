@@ -221,6 +221,18 @@ impl Builder {
         self.op(Op::Probe(site), operands, &[]);
     }
 
+    /// A number as a device might store it in 16 bits.
+    pub(super) fn perturb_store(&mut self, value: Value) -> Value {
+        let site = self.perturbed.len() as u32;
+        let product = None;
+        let perturbed = Op::Perturb(Perturbed {
+            op: Arith::RoundHalf,
+            site,
+            product,
+        });
+        self.op(perturbed, &[value, value], &[Class::Float])[0]
+    }
+
     /// A result as a device might have computed it; the same for a result that is known.
     fn perturb(&mut self, op: Arith, value: Value, operands: &[Value]) -> Value {
         if op.chooses() || op.drops_digits() {

@@ -56,6 +56,18 @@ impl<'a> Translator<'a> {
         }
     }
 
+    /// Whether texels that are written are 16-bit floats.
+    fn is_half(&self, image: u16) -> bool {
+        use etalon_core::Format as F;
+        matches!(
+            self.binding_kind(image),
+            BindingKind::StorageTexture {
+                format: F::R16Float | F::Rg16Float | F::Rgba16Float,
+                ..
+            }
+        )
+    }
+
     /// Depth textures are read as one number, all others as four.
     fn channels(&self, frame: &Frame<'a>, image: Handle<Expression>) -> usize {
         match *self.ty(frame, image) {
@@ -140,7 +152,12 @@ impl<'a> Translator<'a> {
         let mut operands = self.coordinates(frame, access, coordinate, layer)?;
         let signed = self.kind(frame, coordinate)? == naga::ScalarKind::Sint;
         self.check_texel(access, false, signed, Access::Write, &operands);
-        let channels = self.scalars(frame, value)?;
+        let mut channels = self.scalars(frame, value)?;
+        if self.builder.instrument.perturbs && class == Class::Float && self.is_half(image) {
+            for channel in &mut channels {
+                *channel = self.builder.perturb_store(*channel);
+            }
+        }
         operands.extend(&channels);
         self.where_alive(|this| {
             if this.builder.instrument.probes {

@@ -9,10 +9,12 @@
 //! It samples and does not bound. An error that is spread evenly over an interval is
 //! below a quarter of its end in all of eight samples once in 4⁸ = 65,536 times, so four
 //! times the largest move counts as the end. Stores may truncate instead of rounding to
-//! nearest: a unit of the format for each pass so far. And where a decision hangs on a
+//! nearest: those of 16-bit floats are perturbed as well; of others a unit of the format is
+//! added, of 11-bit floats one for each pass so far. And where a decision hangs on a
 //! rounding, a device may take it in a texel in which no sample did: as many texels may
 //! be outside as samples have decided otherwise in.
 
+use etalon_core::format::Encoding;
 use etalon_core::image::ImageData;
 use serde::{Deserialize, Serialize};
 
@@ -145,7 +147,11 @@ impl Spread {
                 let beyond = (0..4).find_map(|channel| {
                     let (value, centre) = (f64::from(texel[channel]), f64::from(centre[channel]));
                     let unit = 2.0 * half_step(image.desc.format, channel, centre.abs());
-                    let allowed = FACTOR * moves.moved[index][channel] + (number + 1) as f64 * unit;
+                    let stores = match image.desc.format.encoding() {
+                        Encoding::Ufloat => (number + 1) as f64,
+                        _ => 1.0,
+                    };
+                    let allowed = FACTOR * moves.moved[index][channel] + stores * unit;
                     // Written so that a NaN is outside.
                     let within = (value - centre).abs() <= allowed;
                     (!within).then_some((channel, value, centre, allowed))

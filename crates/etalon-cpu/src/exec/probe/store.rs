@@ -99,7 +99,8 @@ pub(super) fn see(tally: &mut Tally, format: Format, scalars: &[Scalar], who: La
         let difference = (f64::from(scalar.single) - scalar.double).abs();
         if difference > 0.0 {
             most = most.max(difference / ulp(scalar.double));
-            let relative = difference / scalar.double.abs().max(format.floor);
+            let scale = magnitude.max(scalar.double.abs());
+            let relative = difference / scale.max(format.floor);
             if worst.is_none_or(|(worst, _)| relative > worst) {
                 worst = Some((relative, place));
             }

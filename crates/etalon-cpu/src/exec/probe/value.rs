@@ -68,7 +68,7 @@ fn number(
     let unit = ulp(exact);
     let ulps = difference / unit;
     tally.error(who.times, ulps);
-    let relative = relative(difference, exact);
+    let relative = relative(result.single, exact);
     tally.relative.see(relative, place);
     if !op.chooses() {
         let (alone, _) = twin.of_singles(operands);
@@ -99,10 +99,7 @@ fn given(
     let numbers = || operands.iter().filter(|operand| operand.is_float);
     if error > VISIBLE {
         let given = numbers()
-            .map(|operand| {
-                let difference = (f64::from(operand.single) - operand.double).abs();
-                relative(difference, operand.double)
-            })
+            .map(|operand| relative(operand.single, operand.double))
             .fold(0.0, f64::max);
         if given * GROWS <= error {
             tally.lost.add(who.times, place);
@@ -124,10 +121,13 @@ fn exponent(value: f32) -> u32 {
     value.to_bits() >> 23 & 0xff
 }
 
-/// Relative to the exact result, or to the least normal number.
+/// Relative to the larger of the two results, or to the least normal number: next to
+/// nothing is all digits lost, however near to it the exact result is.
 #[inline]
-fn relative(difference: f64, exact: f64) -> f64 {
-    difference / exact.abs().max(f32::MIN_POSITIVE.into())
+fn relative(single: f32, exact: f64) -> f64 {
+    let single = f64::from(single);
+    let scale = single.abs().max(exact.abs());
+    (single - exact).abs() / scale.max(f32::MIN_POSITIVE.into())
 }
 
 /// A comparison or a conversion to an integer.

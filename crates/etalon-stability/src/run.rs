@@ -354,7 +354,11 @@ impl Pair<'_> {
                     for (number, stores) in frames.iter().enumerate() {
                         let double = double.and_then(|(_, frames)| frames.get(number));
                         let double = double.map_or(&[][..], Vec::as_slice);
-                        errors.look(number, stores, double, arithmetic == Arithmetic::Strict);
+                        let strict = arithmetic == Arithmetic::Strict;
+                        if let Some(step) = self.steps.get(number) {
+                            let shown = rounding::Shown::of(&step.frame.colour);
+                            errors.look(number, stores, double, &shown, strict);
+                        }
                     }
                 }
                 Kind::Wgpu | Kind::Ash if arithmetic == Arithmetic::Strict => {

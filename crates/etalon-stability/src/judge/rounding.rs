@@ -18,6 +18,7 @@
 //! their format each. Sums of non-negative values with non-negative weights keep
 //! relative errors as they are, so these add up and do not grow.
 
+use etalon_core::image::ImageData;
 use serde::{Deserialize, Serialize};
 
 use super::scale::{self, half_step};
@@ -62,6 +63,32 @@ impl Rounding {
     }
 }
 
+/// What a frame gave, as far as errors depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// The brightest light, up to 65504.
+    pub brightest: f64,
+    /// The longer side in texels.
+    pub side: u32,
+}
+
+impl Shown {
+    /// Of an image of light.
+    #[must_use]
+    pub fn of(colour: &ImageData) -> Self {
+        let format = colour.desc.format;
+        let texels = colour.bytes.chunks_exact(format.texel_bytes() as usize);
+        let light = texels.flat_map(|texel| {
+            let [r, g, b, _] = format.decode(texel).to_f64();
+            [r, g, b]
+        });
+        Self {
+            brightest: light.fold(0.0, f64::max).min(65_504.0),
+            side: colour.desc.extent.width.max(colour.desc.extent.height),
+        }
+    }
+}
+
 /// What is gathered over the frames of a case.
 #[derive(Clone, Debug)]
 pub struct Gathering {
@@ -88,8 +115,19 @@ impl Gathering {
     /// Takes a frame's stores with their shadows, and those of the `f64` run that
     /// decides for itself, if there was one. `quantised` if kernels round to whole
     /// codes themselves.
-    pub fn look(&mut self, frame: usize, stores: &[Store], double: &[Store], quantised: bool) {
+    pub fn look(
+        &mut self,
+        frame: usize,
+        stores: &[Store],
+        double: &[Store],
+        shown: &Shown,
+        quantised: bool,
+    ) {
         let mut inherited = 0.0;
+        let places = stores.iter().find(|store| store.pass == "ssr/march");
+        let places = places
+            .and_then(|store| store.image.as_ref())
+            .map_or(0.0, |image| scale::unit(image.desc.format));
         for (number, store) in stores.iter().enumerate() {
             let (Some(image), Some(wide)) = (&store.image, &store.wide) else {
                 continue;
@@ -99,6 +137,9 @@ impl Gathering {
                 pass: &store.pass,
                 format,
                 inherited,
+                brightest: shown.brightest,
+                side: shown.side,
+                places,
                 arithmetic_mean: self.arithmetic_mean,
             };
             let allowed = self.bound + inherited;
@@ -144,10 +185,11 @@ impl Gathering {
     }
 }
 
-/// Whether two `f64` runs are further apart than rounding to the format and what is
-/// inherited explain: they have taken different decisions.
+/// Whether two `f64` runs have taken different decisions, here or in what was read:
+/// whether they are further apart than a small part, 1/16, of the error that is
+/// looked for.
 fn differ(place: &scale::Place<'_>, a: &[f64; 4], b: &[f64; 4]) -> bool {
-    !(texel_error(place, a, b, 1.0).0 <= BOUND + place.inherited)
+    !(texel_error(place, a, b, 0.0).0 <= (BOUND + place.inherited) / 16.0)
 }
 
 /// The largest error of a texel's channels beyond so many half steps of the format,

@@ -8,6 +8,7 @@ use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_core::resource::Limits;
 use etalon_effects::knob::KnobValue;
+use etalon_effects::ssr::Ssr;
 use etalon_effects::{EffectEntry, EffectError, effect, effects};
 use etalon_scenes::cases::{Step, case};
 use thiserror::Error;
@@ -356,7 +357,7 @@ impl Pair<'_> {
                         let double = double.map_or(&[][..], Vec::as_slice);
                         let strict = arithmetic == Arithmetic::Strict;
                         if let Some(step) = self.steps.get(number) {
-                            let shown = rounding::Shown::of(&step.frame.colour);
+                            let shown = rounding::Shown::of(&step.frame.colour, self.blur());
                             errors.look(number, stores, double, &shown, strict);
                         }
                     }
@@ -394,6 +395,19 @@ impl Pair<'_> {
             result.executions += 1;
         }
         Ok(frames)
+    }
+
+    /// Texels to either side that reflections are blurred over.
+    fn blur(&self) -> u32 {
+        let set = self
+            .subject
+            .knobs
+            .iter()
+            .find(|(name, _)| *name == "blur_radius");
+        match set {
+            Some((_, KnobValue::Count(radius))) => *radius,
+            _ => Ssr::default().blur_radius,
+        }
     }
 
     /// Plans a graph for an executor. What would be planned for a device that stores

@@ -3,5 +3,6 @@
 pub mod agreement;
 pub mod finite;
 pub mod recovery;
+mod reflection;
 pub mod rounding;
 pub mod scale;

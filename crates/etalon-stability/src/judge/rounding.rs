@@ -21,6 +21,7 @@
 use etalon_core::image::ImageData;
 use serde::{Deserialize, Serialize};
 
+use super::reflection::Reflection;
 use super::scale::{self, half_step};
 use crate::observe::{Place, Store};
 
@@ -70,12 +71,17 @@ pub struct Shown {
     pub brightest: f64,
     /// The longer side in texels.
     pub side: u32,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// Texels to either side that reflections are blurred over.
+    pub blur: u32,
 }
 
 impl Shown {
-    /// Of an image of light.
+    /// Of an image of light, whose reflections are blurred over so many texels to
+    /// either side.
     #[must_use]
-    pub fn of(colour: &ImageData) -> Self {
+    pub fn of(colour: &ImageData, blur: u32) -> Self {
         let format = colour.desc.format;
         let texels = colour.bytes.chunks_exact(format.texel_bytes() as usize);
         let light = texels.flat_map(|texel| {
@@ -85,6 +91,8 @@ impl Shown {
         Self {
             brightest: light.fold(0.0, f64::max).min(65_504.0),
             side: colour.desc.extent.width.max(colour.desc.extent.height),
+            size: [colour.desc.extent.width, colour.desc.extent.height],
+            blur,
         }
     }
 }
@@ -124,6 +132,7 @@ impl Gathering {
         quantised: bool,
     ) {
         let mut inherited = 0.0;
+        let mut reflection = Reflection::new(shown);
         let places = stores.iter().find(|store| store.pass == "ssr/march");
         let places = places
             .and_then(|store| store.image.as_ref())
@@ -149,11 +158,12 @@ impl Gathering {
             for (index, (bytes, exact)) in bytes.zip(wide).enumerate() {
                 self.found.texels += 1;
                 let alone = alone.and_then(|alone| alone.get(index));
-                if alone.is_some_and(|alone| differ(&place, alone, exact)) {
+                let stored = format.decode(bytes).to_f64();
+                let otherwise = alone.is_some_and(|alone| differ(&place, alone, exact));
+                if reflection.leaves_out(&store.pass, index, otherwise, &stored, exact) {
                     self.found.otherwise += 1;
                     continue;
                 }
-                let stored = format.decode(bytes).to_f64();
                 let (error, channel) = texel_error(&place, &stored, exact, steps);
                 self.errors.push(error as f32);
                 if !(error <= allowed) {
@@ -167,6 +177,7 @@ impl Gathering {
                     self.found.exact = exact[channel];
                 }
             }
+            reflection.next(&store.pass);
             // The graph's outputs are stores of passes again.
             if store.pass != "output" {
                 inherited += scale::unit(format);

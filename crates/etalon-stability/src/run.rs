@@ -429,7 +429,7 @@ impl Pair<'_> {
             Plan::new(graph, self.kernels, &options)
         };
         let limits = backend.limits();
-        with(limits.clone()).map_err(|error| {
+        with(limits).map_err(|error| {
             let extended_storage_formats = true;
             let more = Limits {
                 extended_storage_formats,

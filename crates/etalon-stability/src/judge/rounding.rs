@@ -166,10 +166,10 @@ impl Gathering {
                 }
                 let (error, channel) = texel_error(&place, &stored, exact, steps);
                 self.errors.push(error as f32);
-                if !(error <= allowed) {
+                if error > allowed {
                     self.found.beyond += 1;
                 }
-                if !(error / allowed <= self.found.strain()) {
+                if error / allowed > self.found.strain() {
                     self.found.max = error;
                     self.found.allowed = allowed;
                     self.found.at = store.place(frame, index, channel);
@@ -200,11 +200,11 @@ impl Gathering {
 /// whether they are further apart than a small part, 1/16, of the error that is
 /// looked for.
 fn differ(place: &scale::Place<'_>, a: &[f64; 4], b: &[f64; 4]) -> bool {
-    !(texel_error(place, a, b, 0.0).0 <= (BOUND + place.inherited) / 16.0)
+    texel_error(place, a, b, 0.0).0 > (BOUND + place.inherited) / 16.0
 }
 
 /// The largest error of a texel's channels beyond so many half steps of the format,
-/// and which it is; infinite where one is a number and the other none.
+/// and which it is; infinite, and never NaN, where one is a number and the other none.
 fn texel_error(
     place: &scale::Place<'_>,
     stored: &[f64; 4],

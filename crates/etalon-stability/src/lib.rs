@@ -27,7 +27,7 @@
 //! let options = Options {
 //!     cases: vec!["size-3x3".to_owned()],
 //!     effects: vec!["bloom".to_owned()],
-//!     executors: vec![Kind::Cpu, Kind::Shadow],
+//!     executors: vec![Kind::Cpu, Kind::Double, Kind::Shadow],
 //!     ..Options::default()
 //! };
 //! let report = run(&options, &mut ())?;

@@ -9,6 +9,7 @@ use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_core::resource::Limits;
 use etalon_cpu::StepSanitised;
 use etalon_effects::knob::KnobValue;
+use etalon_effects::ssr::Ssr;
 use etalon_effects::{EffectEntry, EffectError, effect, effects};
 use etalon_scenes::cases::{Step, case};
 use thiserror::Error;
@@ -378,7 +379,11 @@ impl Pair<'_> {
                     for (number, stores) in frames.iter().enumerate() {
                         let double = double.and_then(|frames| frames.get(number));
                         let double = double.map_or(&[][..], Vec::as_slice);
-                        errors.look(number, stores, double, arithmetic == Arithmetic::Strict);
+                        let strict = arithmetic == Arithmetic::Strict;
+                        if let Some(step) = self.steps.get(number) {
+                            let shown = rounding::Shown::of(&step.frame.colour, self.blur());
+                            errors.look(number, stores, double, &shown, strict);
+                        }
                     }
                 }
                 Kind::Sanitiser => {
@@ -447,10 +452,28 @@ impl Pair<'_> {
         for step in steps {
             let graph = self.subject.graph(self.effect, step)?;
             let plan = self.plan(executor, &graph, arithmetic)?;
+            // An effect that is off hands on what it was given.
+            if plan.steps.is_empty() {
+                frames.push(Vec::new());
+                continue;
+            }
             frames.push(executor.run(&plan, &step.frame.inputs())?);
             result.executions += 1;
         }
         Ok(frames)
+    }
+
+    /// Texels to either side that reflections are blurred over.
+    fn blur(&self) -> u32 {
+        let set = self
+            .subject
+            .knobs
+            .iter()
+            .find(|(name, _)| *name == "blur_radius");
+        match set {
+            Some((_, KnobValue::Count(radius))) => *radius,
+            _ => Ssr::default().blur_radius,
+        }
     }
 
     /// Plans a graph for an executor. What would be planned for a device that stores
@@ -472,7 +495,7 @@ impl Pair<'_> {
             Plan::new(graph, self.kernels, &options)
         };
         let limits = backend.limits();
-        with(limits.clone()).map_err(|error| {
+        with(limits).map_err(|error| {
             let extended_storage_formats = true;
             let more = Limits {
                 extended_storage_formats,

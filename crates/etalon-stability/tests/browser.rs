@@ -98,7 +98,7 @@ fn open(found: &Report) -> Option<serde_json::Value> {
 fn the_worst_case_comes_first_and_words_filter() {
     let options = Options {
         cases: vec!["size-1x1".to_owned(), "size-3x3".to_owned()],
-        executors: vec![Kind::Cpu, Kind::Shadow],
+        executors: vec![Kind::Cpu],
         plant: Some(Plant {
             executor: Kind::Cpu,
             fault: Fault::Nan,

@@ -1,7 +1,7 @@
 //! Every effect on every case, on the interpreter and on every device there is.
 //!
-//! In the development profile cases of more than [`LARGEST`] texels run for one
-//! effect each, the one that contains all others: pictures of 65,536 texels, one for
+//! Cases of more than [`LARGEST`] texels run for one effect each, the one that
+//! contains all others: pictures of 65,536 texels, one for
 //! each half float, on five executors take most of the time and differ from each
 //! other by the channel alone. `cargo xtask stability` runs all of them.
 
@@ -44,9 +44,9 @@ fn every_effect_on_every_case_stores_the_same_numbers_everywhere() {
     assert!(report.totals.executions > 2000, "{:?}", report.totals);
     for case in &report.cases {
         for result in &case.results {
-            if !matches!(result.status, Status::Unsupported { .. }) {
+            if !matches!(result.status, Status::Unsupported { .. }) && !is_off(&case.name) {
                 assert!(result.executions as usize >= case.frames, "{}", case.name);
-                assert!(result.stores > 0 || is_off(&case.name), "{}", case.name);
+                assert!(result.stores > 0, "{}", case.name);
             }
         }
         let shadow = case.on("cpu-shadow").unwrap();
@@ -69,7 +69,7 @@ fn the_chain_takes_every_bit_pattern() {
         &Options {
             cases: vec!["bits-half".to_owned(), "bits-single".to_owned()],
             effects: vec!["chain".to_owned()],
-            executors: vec![Kind::Cpu, Kind::Shadow, Kind::Wgpu],
+            executors: vec![Kind::Cpu, Kind::Double, Kind::Shadow, Kind::Wgpu],
             ..Options::default()
         },
         &mut (),

@@ -123,7 +123,7 @@ fn the_exit_status_tells_findings_from_faults_of_the_command() {
         "--effect",
         "ssr",
         "--executor",
-        "cpu,cpu-shadow",
+        "cpu,cpu-f64,cpu-shadow",
     ];
     let with = |more: &[&str]| program(&[&few[..], more].concat());
     let (status, text) = with(&[]);

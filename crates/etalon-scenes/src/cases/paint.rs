@@ -136,7 +136,7 @@ impl Spot {
 
     /// Two colours in turn, all that a reflection needs to be told from another.
     pub(super) fn chequer(&self) -> [f32; 3] {
-        if (self.x / 4 + self.y / 4) % 2 == 0 {
+        if (self.x / 4 + self.y / 4).is_multiple_of(2) {
             [0.9, 0.4, 0.1]
         } else {
             [0.1, 0.3, 1.2]

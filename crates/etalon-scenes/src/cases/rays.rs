@@ -433,4 +433,18 @@ pub(super) const CASES: &[Case] = &[
 ];
 
 /// What is left of a difference of two distances of 10 km.
-const TEN_KM: &[Expected] = &[];
+const TEN_KM: &[Expected] = &[
+    Expected {
+        effect: "ssr",
+        bound: 1.0 / 256.0,
+        reason: TEN_KM_REASON,
+    },
+    Expected {
+        effect: "chain",
+        bound: 1.0 / 256.0,
+        reason: TEN_KM_REASON,
+    },
+];
+
+const TEN_KM_REASON: &str = "distances of 10 km have steps of 2^-10 m in f32, which is 2^-8 of the thickness of 0.25 \
+     that the fade by depth divides by; the depth given has no more digits";

@@ -3,6 +3,7 @@
 pub mod agreement;
 pub mod finite;
 pub mod recovery;
+mod reflection;
 pub mod rounding;
 pub mod scale;
 pub mod spread;

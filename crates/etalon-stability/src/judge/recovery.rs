@@ -25,7 +25,8 @@ pub fn differs(frame: usize, faulty: &[Store], clean: &[Store]) -> Option<Place>
                 Encoding::Unorm | Encoding::UnormSrgb => 1.001 / 255.0,
                 _ => BOUND * b[channel].abs(),
             };
-            if !((a[channel] - b[channel]).abs() <= allowed) {
+            let distance = (a[channel] - b[channel]).abs();
+            if distance.is_nan() || distance > allowed {
                 return Some(faulty.place(frame, index, channel));
             }
         }

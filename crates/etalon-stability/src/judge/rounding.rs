@@ -18,8 +18,10 @@
 //! their format each. Sums of non-negative values with non-negative weights keep
 //! relative errors as they are, so these add up and do not grow.
 
+use etalon_core::image::ImageData;
 use serde::{Deserialize, Serialize};
 
+use super::reflection::Reflection;
 use super::scale::{self, half_step};
 use crate::observe::{Place, Store};
 
@@ -62,6 +64,39 @@ impl Rounding {
     }
 }
 
+/// What a frame gave, as far as errors depend on it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shown {
+    /// The brightest light, up to 65504.
+    pub brightest: f64,
+    /// The longer side in texels.
+    pub side: u32,
+    /// Width and height in texels.
+    pub size: [u32; 2],
+    /// Texels to either side that reflections are blurred over.
+    pub blur: u32,
+}
+
+impl Shown {
+    /// Of an image of light, whose reflections are blurred over so many texels to
+    /// either side.
+    #[must_use]
+    pub fn of(colour: &ImageData, blur: u32) -> Self {
+        let format = colour.desc.format;
+        let texels = colour.bytes.chunks_exact(format.texel_bytes() as usize);
+        let light = texels.flat_map(|texel| {
+            let [r, g, b, _] = format.decode(texel).to_f64();
+            [r, g, b]
+        });
+        Self {
+            brightest: light.fold(0.0, f64::max).min(65_504.0),
+            side: colour.desc.extent.width.max(colour.desc.extent.height),
+            size: [colour.desc.extent.width, colour.desc.extent.height],
+            blur,
+        }
+    }
+}
+
 /// What is gathered over the frames of a case.
 #[derive(Clone, Debug)]
 pub struct Gathering {
@@ -88,8 +123,20 @@ impl Gathering {
     /// Takes a frame's stores with their shadows, and those of the `f64` run that
     /// decides for itself, if there was one. `quantised` if kernels round to whole
     /// codes themselves.
-    pub fn look(&mut self, frame: usize, stores: &[Store], double: &[Store], quantised: bool) {
+    pub fn look(
+        &mut self,
+        frame: usize,
+        stores: &[Store],
+        double: &[Store],
+        shown: &Shown,
+        quantised: bool,
+    ) {
         let mut inherited = 0.0;
+        let mut reflection = Reflection::new(shown);
+        let places = stores.iter().find(|store| store.pass == "ssr/march");
+        let places = places
+            .and_then(|store| store.image.as_ref())
+            .map_or(0.0, |image| scale::unit(image.desc.format));
         for (number, store) in stores.iter().enumerate() {
             let (Some(image), Some(wide)) = (&store.image, &store.wide) else {
                 continue;
@@ -99,6 +146,9 @@ impl Gathering {
                 pass: &store.pass,
                 format,
                 inherited,
+                brightest: shown.brightest,
+                side: shown.side,
+                places,
                 arithmetic_mean: self.arithmetic_mean,
             };
             let allowed = self.bound + inherited;
@@ -108,17 +158,18 @@ impl Gathering {
             for (index, (bytes, exact)) in bytes.zip(wide).enumerate() {
                 self.found.texels += 1;
                 let alone = alone.and_then(|alone| alone.get(index));
-                if alone.is_some_and(|alone| differ(&place, alone, exact)) {
+                let stored = format.decode(bytes).to_f64();
+                let otherwise = alone.is_some_and(|alone| differ(&place, alone, exact));
+                if reflection.leaves_out(&store.pass, index, otherwise, &stored, exact) {
                     self.found.otherwise += 1;
                     continue;
                 }
-                let stored = format.decode(bytes).to_f64();
                 let (error, channel) = texel_error(&place, &stored, exact, steps);
                 self.errors.push(error as f32);
-                if !(error <= allowed) {
+                if error > allowed {
                     self.found.beyond += 1;
                 }
-                if !(error / allowed <= self.found.strain()) {
+                if error / allowed > self.found.strain() {
                     self.found.max = error;
                     self.found.allowed = allowed;
                     self.found.at = store.place(frame, index, channel);
@@ -126,6 +177,7 @@ impl Gathering {
                     self.found.exact = exact[channel];
                 }
             }
+            reflection.next(&store.pass);
             // The graph's outputs are stores of passes again.
             if store.pass != "output" {
                 inherited += scale::unit(format);
@@ -144,14 +196,15 @@ impl Gathering {
     }
 }
 
-/// Whether two `f64` runs are further apart than rounding to the format and what is
-/// inherited explain: they have taken different decisions.
+/// Whether two `f64` runs have taken different decisions, here or in what was read:
+/// whether they are further apart than a small part, 1/16, of the error that is
+/// looked for.
 fn differ(place: &scale::Place<'_>, a: &[f64; 4], b: &[f64; 4]) -> bool {
-    !(texel_error(place, a, b, 1.0).0 <= BOUND + place.inherited)
+    texel_error(place, a, b, 0.0).0 > (BOUND + place.inherited) / 16.0
 }
 
 /// The largest error of a texel's channels beyond so many half steps of the format,
-/// and which it is; infinite where one is a number and the other none.
+/// and which it is; infinite, and never NaN, where one is a number and the other none.
 fn texel_error(
     place: &scale::Place<'_>,
     stored: &[f64; 4],

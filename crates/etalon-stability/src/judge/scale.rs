@@ -9,14 +9,23 @@
 //! * a sum of logarithms counts relative to the number of its terms, a stop each;
 //! * what was once stored in a float with five bits of exponent has absolute steps
 //!   below 2⁻¹⁴; `f32` has below 2⁻¹²⁶, where devices may flush (WGSL §15.7.2);
+//! * a reflection is looked up between texels at a place in `f32`, so that it is off by
+//!   the place's error, in texels, times what neighbouring texels differ by: at most
+//!   the brightest light of the frame;
 //! * bloom subtracts a threshold of the order of 1 from what it is given: an error
 //!   that it inherits from a store before it stays as it is while the value shrinks.
 
 use etalon_core::Format;
 use etalon_core::format::Encoding;
 
+use super::rounding::BOUND;
+
 /// The least normal number of formats with five bits of exponent.
 const LEAST_NORMAL_HALF: f64 = 1.0 / 16_384.0;
+
+/// Roundings of a coordinate on its way through projection, march and look-up, each
+/// of at most half a unit of the last place of 1.
+const COORDINATE: f64 = 16.0 / 33_554_432.0;
 
 /// A store, as far as its scale depends on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +36,12 @@ pub struct Place<'a> {
     pub format: Format,
     /// Relative error of what it was given, from stores before it.
     pub inherited: f64,
+    /// The brightest light that the frame gave.
+    pub brightest: f64,
+    /// The longer side of the frame in texels.
+    pub side: u32,
+    /// Relative error of the format that places of reflections are stored in.
+    pub places: f64,
     /// Whether luminance is summed as it is and not by its logarithm.
     pub arithmetic_mean: bool,
 }
@@ -55,6 +70,11 @@ impl Place<'_> {
         }
         if kernel.starts_with("bloom/") && self.inherited > 0.0 {
             return 1.0;
+        }
+        if kernel.starts_with("ssr/") && kernel != "ssr/march" {
+            // What is allowed of this scale is what the place's error allows.
+            let texels = f64::from(self.side) * (COORDINATE + 0.5 * self.places);
+            return (texels * self.brightest / BOUND).max(LEAST_NORMAL_HALF);
         }
         if self.inherited > 0.0 || half_step(self.format, channel, 1.0) > 1e-6 {
             LEAST_NORMAL_HALF
@@ -138,6 +158,9 @@ mod tests {
             pass,
             format,
             inherited,
+            brightest: 2.0,
+            side: 1024,
+            places: 0.0,
             arithmetic_mean: false,
         };
         let texel = [1e-9, 100.0, 0.0, 0.0];
@@ -145,7 +168,8 @@ mod tests {
         assert_eq!(march.scale(0, &texel), 1.0);
         assert_eq!(march.scale(3, &texel), f64::from(f32::MIN_POSITIVE));
         let resolve = place("ssr/resolve", Format::Rgba16Float, 0.0);
-        assert_eq!(resolve.scale(0, &texel), LEAST_NORMAL_HALF);
+        // 1024 · 2^-21 texels of light of 2.
+        assert_eq!(resolve.scale(0, &texel) * BOUND, 2.0_f64.powi(-10));
         assert_eq!(resolve.scale(3, &texel), 1.0);
         let sums = place("exposure/reduce#2", Format::Rgba32Float, 0.0);
         assert_eq!(sums.scale(0, &texel), 100.0);

@@ -133,6 +133,14 @@ pub(super) fn wanted(inst: &CodeInst) -> [bool; 4] {
     std::array::from_fn(|channel| inst.results.get(channel).is_some_and(Option::is_some))
 }
 
+/// The results of an instruction that has up to four. One by one: a copy of how many
+/// there are is a call.
+#[inline(always)]
+pub(super) fn four(results: &[Option<Slot>]) -> [Option<Slot>; 4] {
+    let one = |channel: usize| results.get(channel).copied().flatten();
+    [one(0), one(1), one(2), one(3)]
+}
+
 /// The texels that an instruction's operands name in one level, by block.
 #[derive(Clone, Copy)]
 struct Addresses {
@@ -247,15 +255,11 @@ impl<'s, 'a, N: Number, I: Isa> LoadBlocks<'s, 'a, N, I> {
         addresses: Addresses,
         inst: &CodeInst,
     ) -> Self {
-        let mut results = [None; 4];
-        for (to, result) in results.iter_mut().zip(&inst.results) {
-            *to = *result;
-        }
         Self {
             state,
             texture,
             addresses,
-            results,
+            results: four(&inst.results),
             isa: PhantomData,
         }
     }

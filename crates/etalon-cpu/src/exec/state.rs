@@ -23,6 +23,8 @@ pub(crate) struct LocalIds {
     pub(crate) ids: [Vec<Lanes<u32>>; 4],
     /// All ones where there is an invocation.
     pub(crate) active: Vec<Lanes<u32>>,
+    /// Invocations next to each other in x.
+    pub(crate) width: u32,
 }
 
 impl LocalIds {
@@ -49,6 +51,7 @@ impl LocalIds {
                 lanes(&at),
             ],
             active: lanes(&|i| crate::num::mask(i < count)),
+            width: size[0],
         }
     }
 }
@@ -125,6 +128,14 @@ impl<'a, N: Number> State<'a, N> {
     #[inline(always)]
     pub(crate) fn group_in_batch(&self, chunk: usize) -> u32 {
         ((self.first_chunk + chunk) / self.local_ids.active.len()) as u32
+    }
+
+    /// How many invocations of the batch are next to each other in x, if it is of
+    /// whole workgroups.
+    #[inline(always)]
+    pub(crate) fn width(&self) -> u32 {
+        let groups = self.chunks / self.local_ids.active.len().max(1);
+        self.local_ids.width.wrapping_mul(groups as u32)
     }
 
     /// Where a chunk of a register of lanes is.

@@ -42,6 +42,18 @@ word!(AtomicU16, u16);
 word!(AtomicU32, u32);
 word!(AtomicU64, u64);
 
+/// Where a texel would be, whether or not it is there.
+#[inline(always)]
+pub(super) fn address(texels: &Texels, at: usize) -> *const u8 {
+    match texels {
+        Texels::B1(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B2(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B4(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B8(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B16(words) => words.as_ptr().wrapping_add(at.wrapping_mul(2)).cast(),
+    }
+}
+
 /// Whether every index, `per` words each, is in `words`.
 #[inline(always)]
 fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> bool {

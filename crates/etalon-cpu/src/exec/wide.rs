@@ -32,6 +32,23 @@ pub(super) fn channel<I: Isa, const K: usize>(
     out
 }
 
+/// Asks for what the batch after this one, `width` invocations wide, will read or
+/// write, if it is beside it.
+#[inline(always)]
+pub(super) fn ask_ahead<I: Isa, const K: usize>(wide: &WideTexels, index: &[u32; K], width: u32) {
+    /// Numbers in a cache line.
+    const LINE: usize = 8;
+    for channel in 0..wide.channels() {
+        let values = wide.channel(channel).as_ptr();
+        for row in index.as_chunks::<LINE>().0 {
+            if row[0] != OUTSIDE {
+                let next = row[0].wrapping_add(width) as usize;
+                I::prefetch(values.wrapping_add(next).cast());
+            }
+        }
+    }
+}
+
 /// Sets the results of a load from the wide plane and, as far as the number
 /// type keeps them, the texels' `singles`.
 #[inline(always)]

@@ -5,7 +5,18 @@ use std::mem::transmute;
 
 use super::{BLOCK, Isa};
 
-/// Stores of all tiers.
+/// What all tiers have.
+macro_rules! prefetches {
+    () => {
+        #[inline(always)]
+        fn prefetch(address: *const u8) {
+            // SAFETY: a hint, which no address makes fail.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) };
+        }
+    };
+}
+
+/// Stores of the lower tiers.
 macro_rules! stores_in_runs {
     () => {
         #[inline(always)]
@@ -37,6 +48,8 @@ macro_rules! with_sse2 {
             // SAFETY: the caller's promise.
             unsafe { load_pairs(words, index) }
         }
+
+        prefetches!();
 
         stores_in_runs!();
 
@@ -274,6 +287,8 @@ pub(crate) struct Avx512;
 
 // SAFETY: the instructions are those that the tier has.
 unsafe impl Isa for Avx512 {
+    prefetches!();
+
     /// As [`load_near`], for the two halves at once.
     #[inline(always)]
     unsafe fn load4(words: *const u32, count: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {

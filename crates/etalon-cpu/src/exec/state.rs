@@ -339,6 +339,25 @@ impl<'a, N: Number> State<'a, N> {
         }
     }
 
+    /// A block of [`State::set_both`] in a register of lanes, both as bits.
+    #[inline(always)]
+    pub(crate) fn set_both_block(
+        &mut self,
+        slot: Slot,
+        chunk: usize,
+        block: usize,
+        singles: [u32; BLOCK],
+        doubles: [u64; BLOCK],
+    ) {
+        let at = self.at(slot.number, chunk);
+        let mut numbers = N::default().splat();
+        for k in 0..BLOCK {
+            let (single, double) = (f32::from_bits(singles[k]), f64::from_bits(doubles[k]));
+            N::set_in_block(&mut numbers, k, N::from_both(single, double));
+        }
+        N::set_block(&mut self.registers.floats[at], block * BLOCK, numbers);
+    }
+
     /// The lanes that take part in an instruction.
     #[inline(always)]
     pub(crate) fn mask(&self, inst: &CodeInst, chunk: usize) -> [u32; LANES] {

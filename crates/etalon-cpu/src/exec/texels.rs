@@ -136,6 +136,18 @@ macro_rules! in_words {
 in_words!(load4, store4, AtomicU32, u32);
 in_words!(load8, store8, AtomicU64, u64);
 
+/// A block of words, if all are inside.
+#[inline(always)]
+pub(super) fn block8<I: Isa>(words: &[AtomicU64], index: [u32; BLOCK]) -> Option<[u64; BLOCK]> {
+    let count = i32::try_from(words.len()).unwrap_or(0) as u32;
+    if !I::all_below(index, count) {
+        return None;
+    }
+    // SAFETY: all indices were seen to be inside, and atomics are laid out as what
+    // they hold.
+    Some(unsafe { I::load8(words.as_ptr().cast(), words.len(), index) })
+}
+
 /// [`load`] where a texel has two words.
 #[inline(always)]
 fn load_pairs<const K: usize>(words: &[AtomicU64], index: &[u32; K]) -> [[u64; K]; 2] {

@@ -379,7 +379,7 @@ impl<N: Number> TieredStep<N> for Store {
                 for row in index.as_chunks::<ROW>().0 {
                     if row[0] != OUTSIDE {
                         let next = row[0].wrapping_add(state.width()) as usize;
-                        I::prefetch(address(&texture.texels, next));
+                        I::prefetch(address(texture.texels, next));
                     }
                 }
             }

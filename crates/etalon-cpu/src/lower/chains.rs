@@ -27,7 +27,7 @@ fn join_block(regs: &[RegInfo], uses: &mut [u32], block: &mut Block) {
     let mut dropped = vec![false; block.insts.len()];
     // From the end on, so that the longest chains are seen whole.
     for last in (0..block.insts.len()).rev() {
-        let search = |pattern| {
+        let search = |pattern: &'static Pattern| {
             let search = Search {
                 pattern,
                 regs,
@@ -36,12 +36,13 @@ fn join_block(regs: &[RegInfo], uses: &mut [u32], block: &mut Block) {
                 insts: &block.insts,
                 last,
             };
-            search.run()
+            let (operands, parts) = search.run()?;
+            Some((pattern.chain, operands, parts))
         };
         if dropped[last] {
             continue;
         }
-        let Some((operands, parts)) = PATTERNS.iter().find_map(search) else {
+        let Some((chain, operands, parts)) = PATTERNS.iter().find_map(search) else {
             continue;
         };
         for &part in &parts {
@@ -50,10 +51,9 @@ fn join_block(regs: &[RegInfo], uses: &mut [u32], block: &mut Block) {
                 uses[operand.0 as usize] -= 1;
             }
         }
-        for operand in &operands.1 {
+        for operand in &operands {
             uses[operand.0 as usize] += 1;
         }
-        let (chain, operands) = operands;
         let inst = &mut block.insts[last];
         inst.op = Op::Chain(chain);
         inst.operands = operands;
@@ -84,14 +84,14 @@ struct Found<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// The chain with its operands, and the instructions it replaces.
-    fn run(&self) -> Option<((crate::ir::chain::Chain, Vec<Reg>), Vec<usize>)> {
+    /// The chain's operands, and the instructions it replaces.
+    fn run(&self) -> Option<(Vec<Reg>, Vec<usize>)> {
         let Pattern {
-            chain,
             lanes,
             numbers,
             bits,
             parts,
+            ..
         } = self.pattern;
         let nothing = Found {
             operands: HashMap::new(),
@@ -103,7 +103,7 @@ impl<'a> Search<'a> {
             .map(|name| found.operands.get(name).copied())
             .collect();
         let parts: Option<Vec<usize>> = found.parts.into_iter().collect();
-        Some(((*chain, operands?), parts?))
+        Some((operands?, parts?))
     }
 
     /// With instruction `at` as part `k`.

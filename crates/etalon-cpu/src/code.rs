@@ -84,6 +84,8 @@ pub(crate) struct Code {
     pub(crate) insts: Vec<CodeInst>,
     pub(crate) prologue: u32,
     pub(crate) blocks: Vec<CodeBlock>,
+    /// Of each chain in turn the numbers of its operands' registers.
+    pub(crate) operands: Vec<u16>,
     /// Uniform registers that hold literals.
     pub(crate) constants: Vec<(Slot, u32)>,
     pub(crate) loops: Vec<Span>,
@@ -177,6 +179,13 @@ impl Code {
                 lanes: block.lanes,
             });
         }
+        let chains = |inst: &&CodeInst| matches!(inst.op, Op::Chain(_));
+        let operands = code
+            .insts
+            .iter()
+            .filter(chains)
+            .flat_map(|inst| &inst.operands);
+        code.operands = operands.map(|slot| slot.number).collect();
         for (i, info) in flat.regs.iter().enumerate() {
             if let (Some(bits), Some(_)) = (info.constant, allocation.numbers[i]) {
                 code.constants.push((slot(Reg(i as u32)), bits));

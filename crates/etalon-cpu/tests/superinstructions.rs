@@ -338,6 +338,243 @@ fn joined_instructions_compute_what_they_do_apart() {
     }
 }
 
+/// Steps, each a type, a name and an expression, on lanes `a` to `e` and on numbers `k0`
+/// to `k3` that are the same in all; the last is the result. And what they become.
+struct Steps {
+    steps: &'static [(&'static str, &'static str, &'static str)],
+    joined: &'static str,
+}
+
+const CHAINS: &[Steps] = &[
+    Steps {
+        steps: &[
+            ("u32", "size", "bitcast<u32>(a) & 0x7fffffffu"),
+            (
+                "u32",
+                "kept",
+                "min(select(size, 0u, size > 0x7f800000u), 0x477fe000u)",
+            ),
+            ("u32", "odd", "(kept >> 13u) & 1u"),
+            (
+                "f32",
+                "normal",
+                "bitcast<f32>((kept + 0xfffu + odd) & 0xffffe000u)",
+            ),
+            ("f32", "raised", "bitcast<f32>(kept) + 0.5"),
+            ("f32", "small", "raised - 0.5"),
+            (
+                "f32",
+                "chosen",
+                "select(small, normal, kept >= 0x38800000u)",
+            ),
+            (
+                "f32",
+                "r",
+                "bitcast<f32>(bitcast<u32>(chosen) | (bitcast<u32>(a) & 0x80000000u))",
+            ),
+        ],
+        joined: "roundbits.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "limited", "min(max(a, 0.0), 1.0)"),
+            ("f32", "scaled", "limited * 255.0"),
+            ("f32", "code", "floor(scaled + 0.5)"),
+            (
+                "f32",
+                "exact",
+                "code * 0.0039215087890625 + code * 5.983839e-8",
+            ),
+            (
+                "f32",
+                "r",
+                "select(limited, exact, abs(scaled - code) < 0.000244140625)",
+            ),
+        ],
+        joined: "snapfraction.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "limited", "min(max(a, 0.0), 1.0)"),
+            ("f32", "code", "floor(limited * 255.0 + 0.5)"),
+            ("f32", "r", "code * 0.0039215087890625 + code * 5.983839e-8"),
+        ],
+        joined: "roundfraction.f",
+    },
+    Steps {
+        steps: &[
+            ("u32", "offset", "bitcast<u32>(a) - 0x3f3504f3u"),
+            ("i32", "exponent", "bitcast<i32>(offset) >> 23u"),
+            (
+                "f32",
+                "f",
+                "bitcast<f32>((offset & 0x007fffffu) + 0x3f3504f3u) - 1.0",
+            ),
+            ("f32", "s", "f / (2.0 + f)"),
+            ("f32", "z", "s * s"),
+            (
+                "f32",
+                "series",
+                "0.6666677594184875 + z * (0.39977535605430603 + z * 0.2987186312675476)",
+            ),
+            ("f32", "h", "0.5 * f * f"),
+            (
+                "f32",
+                "r",
+                "f32(exponent) + ((f - h) + s * (h + z * series)) * 1.442695",
+            ),
+        ],
+        joined: "logseries.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "n", "floor(a + 0.5)"),
+            ("f32", "f", "a - n"),
+            (
+                "f32",
+                "p4",
+                "0.00015353361959569156 * f + 0.0013398875016719103",
+            ),
+            ("f32", "p3", "p4 * f + 0.00961843691766262"),
+            ("f32", "p2", "p3 * f + 0.055503323674201965"),
+            ("f32", "p1", "p2 * f + 0.24022647738456726"),
+            ("f32", "p0", "p1 * f + 0.6931471824645996"),
+            (
+                "f32",
+                "r",
+                "(p0 * f + 1.0) * bitcast<f32>((i32(n) + 127) << 23u)",
+            ),
+        ],
+        joined: "powerseries.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "over", "(b - 1.0) * 0.055"),
+            ("f32", "curve", "b + over"),
+            ("f32", "r", "select(curve, 12.92 * a, a <= 0.0031308)"),
+        ],
+        joined: "lineorcurve.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "over", "a - k0"),
+            ("f32", "hard", "max(over, 0.0)"),
+            ("f32", "rise", "min(k1, max(over + k2, 0.0))"),
+            ("f32", "r", "max(rise * rise * k3, hard)"),
+        ],
+        joined: "knee.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "sum", "a * k0 + b * k1 + c * k2"),
+            ("f32", "r", "1.0 / (d * sum + e)"),
+        ],
+        joined: "divbysum.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "two", "a * k0 + b * 0.5"),
+            ("f32", "r", "two + c * k2"),
+        ],
+        joined: "weightedsum.f",
+    },
+    Steps {
+        steps: &[
+            ("f32", "limited", "min(max(a, 0.0), 65504.0)"),
+            ("f32", "r", "min(limited * k0, 65504.0)"),
+        ],
+        joined: "clampmulatmost.f",
+    },
+];
+
+/// `uniform` has a bit for each of the lanes' operands that is the same in all of
+/// them after all; `twice` looks at what the last step but one gave, so that it is read
+/// by more than the chain.
+fn chain_kernel(chain: &Steps, uniform: u32, apart: bool, twice: bool) -> String {
+    let mut text = String::new();
+    for (k, name) in ["a", "b", "c", "d", "e"].iter().enumerate() {
+        let at = if uniform >> k & 1 == 1 {
+            format!("{}u", 7 * k + 3)
+        } else {
+            format!("(id.x * {}u + {k}u) % 64u", 2 * k + 3)
+        };
+        text += &format!("let {name} = bitcast<f32>(data[{at}]);\n");
+    }
+    for k in 0..4 {
+        text += &format!("let k{k} = bitcast<f32>(data[{}u]);\n", 12 * k + 2);
+    }
+    for (ty, name, step) in chain.steps {
+        text += &if apart {
+            format!(
+                "result[id.x + 256u] = bitcast<u32>({step});
+                 let {name} = bitcast<{ty}>(result[id.x + 256u]);\n"
+            )
+        } else {
+            format!("let {name}: {ty} = {step};\n")
+        };
+    }
+    let extra = match (twice, chain.steps) {
+        (true, [.., (_, name, _), _]) => {
+            format!(" ^ select(0u, 1u, bitcast<u32>({name}) == 12345u)")
+        }
+        _ => String::new(),
+    };
+    format!(
+        "@group(0) @binding(0) var<storage> data: array<u32, 64>;
+         @group(0) @binding(1) var<storage, read_write> result: array<u32, 512>;
+         @compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
+             {text}
+             result[id.x] = bitcast<u32>(r){extra};
+         }}"
+    )
+}
+
+/// [`data`] with numbers of all sizes instead of whole ones.
+fn chain_data() -> Vec<u32> {
+    let mut data = data();
+    for (k, word) in data.iter_mut().enumerate().filter(|(k, _)| k % 4 == 1) {
+        *word = (1.7_f32.powi(k as i32 - 40)).to_bits();
+    }
+    data
+}
+
+#[test]
+fn chains_compute_what_their_steps_do_apart() {
+    let data = chain_data();
+    let executors: Vec<Executor> = Tier::ALL
+        .into_iter()
+        .filter(|tier| tier.is_available())
+        .flat_map(|tier| [64, 256].map(|lanes| (tier, lanes)))
+        .map(|(tier, lanes)| Executor::new(1).unwrap().with_tier(tier).with_lanes(lanes))
+        .collect();
+    for chain in CHAINS {
+        for (uniform, twice) in [(0, false), (0, true), (1, false), (2, false), (24, false)] {
+            let joined = program(&chain_kernel(chain, uniform, false, twice));
+            let apart = program(&chain_kernel(chain, uniform, true, twice));
+            let has = |program: &Program| program.to_string().contains(chain.joined);
+            assert!(!has(&apart), "{} in\n{apart}", chain.joined);
+            if uniform == 0 {
+                assert_eq!(has(&joined), !twice, "{} in\n{joined}", chain.joined);
+            }
+            let mut first = None;
+            for executor in &executors {
+                for program in [&joined, &apart] {
+                    let got = run(program, executor, &data);
+                    let want = first.get_or_insert_with(|| got.clone());
+                    for (i, (got, want)) in got.iter().zip(want.iter()).enumerate() {
+                        let nans = [*got, *want].map(|bits| f32::from_bits(bits).is_nan());
+                        assert!(
+                            got == want || nans == [true; 2],
+                            "{}, uniform {uniform:b}, {i}: {got:x}, not {want:x}\n{program}",
+                            chain.joined
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// A limit that is known to be a number, and the same one read from memory.
 #[test]
 fn known_limits_are_those_of_any_number() {

@@ -8,7 +8,7 @@ use super::lanes::BLOCK;
 use super::link::Instr;
 use super::memory::rounds;
 use super::state::{Resource, State};
-use super::texels::{OUTSIDE, fetch, put};
+use super::texels::{OUTSIDE, address, fetch, put};
 use super::tier::{Handler, Step, Tier, TieredStep};
 use super::wide;
 use crate::code::{CodeInst, Slot};
@@ -133,6 +133,14 @@ pub(super) fn wanted(inst: &CodeInst) -> [bool; 4] {
     std::array::from_fn(|channel| inst.results.get(channel).is_some_and(Option::is_some))
 }
 
+/// The results of an instruction that has up to four. One by one: a copy of how many
+/// there are is a call.
+#[inline(always)]
+pub(super) fn four(results: &[Option<Slot>]) -> [Option<Slot>; 4] {
+    let one = |channel: usize| results.get(channel).copied().flatten();
+    [one(0), one(1), one(2), one(3)]
+}
+
 /// The texels that an instruction's operands name in one level, by block.
 #[derive(Clone, Copy)]
 struct Addresses {
@@ -179,7 +187,38 @@ impl Addresses {
         }
         index
     }
+
+    /// Asks for what the batch after this one will load, if it is beside it and as wide
+    /// as this one. Most kernels read a texel or its surroundings once: without this
+    /// they wait for memory, whose own foresight ends where rows are as short as those
+    /// of workgroups. Before the loads and not between them, whose indices stay in
+    /// vector registers.
+    #[inline(always)]
+    fn ask_ahead<N: Number, I: Isa, W>(&self, state: &State<'_, N>, words: &[W]) {
+        let (true, true, None) = (self.x.varying, self.y.varying, self.z) else {
+            return;
+        };
+        let width = state.width();
+        for chunk in 0..state.chunks {
+            let x = &state.registers.ints[state.at(self.x.number, chunk)].0;
+            let y = &state.registers.ints[state.at(self.y.number, chunk)].0;
+            let rows = x.as_chunks::<ROW>().0.iter().zip(y.as_chunks::<ROW>().0);
+            for (x, y) in rows {
+                // Twice as far where it is every other texel.
+                let step = 1 + x[ROW - 1].wrapping_sub(x[0]) / ROW as u32 % 2;
+                let row = y[0].wrapping_mul(self.level.width);
+                let next = row
+                    .wrapping_add(x[0])
+                    .wrapping_add(width.wrapping_mul(step));
+                let next = next.wrapping_add(self.level.start) as usize;
+                I::prefetch(words.as_ptr().wrapping_add(next).cast());
+            }
+        }
+    }
 }
+
+/// Lanes that mostly are next to each other in a row of a texture.
+const ROW: usize = 8;
 
 struct Load<const K: usize>;
 
@@ -203,7 +242,7 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
             && wide.is_none()
             && let Some(addresses) = Addresses::new(state, texture, access, &inst.operands, level)
         {
-            let load = LoadBlocks::<N, I>::new(state, texture, addresses, inst);
+            let load = LoadBlocks::<N, I>::new(state, texture, addresses, inst, instr.first);
             if with_format(texture, load).is_none() {
                 return;
             }
@@ -211,6 +250,9 @@ impl<N: Number, const K: usize> TieredStep<N> for Load<K> {
         let wanted = wanted(inst);
         for chunk in 0..rounds::<N, K>(state) {
             let index = addresses::<N, K>(state, texture, access, &inst.operands, level, chunk);
+            if let (Some(wide), true) = (wide, instr.first) {
+                wide::ask_ahead::<I, K>(wide, &index, state.width());
+            }
             if let (Some(wide), false) = (wide, N::HAS_SINGLE) {
                 wide::load::<I, N, K>(state, inst, wide, &index, &[[0; K]; 4], chunk);
                 continue;
@@ -236,6 +278,8 @@ struct LoadBlocks<'s, 'a, N: Number, I> {
     texture: &'a TextureView<'a>,
     addresses: Addresses,
     results: [Option<Slot>; 4],
+    /// Whether to [`Addresses::ask_ahead`].
+    ahead: bool,
     isa: PhantomData<I>,
 }
 
@@ -246,16 +290,14 @@ impl<'s, 'a, N: Number, I: Isa> LoadBlocks<'s, 'a, N, I> {
         texture: &'a TextureView<'a>,
         addresses: Addresses,
         inst: &CodeInst,
+        ahead: bool,
     ) -> Self {
-        let mut results = [None; 4];
-        for (to, result) in results.iter_mut().zip(&inst.results) {
-            *to = *result;
-        }
         Self {
             state,
             texture,
             addresses,
-            results,
+            results: four(&inst.results),
+            ahead,
             isa: PhantomData,
         }
     }
@@ -269,8 +311,12 @@ impl<N: Number, I: Isa> WithFormat for LoadBlocks<'_, '_, N, I> {
             texture,
             addresses,
             results,
+            ahead,
             ..
         } = self;
+        if ahead {
+            addresses.ask_ahead::<N, I, F::Word>(state, words);
+        }
         for chunk in 0..state.chunks {
             for block in 0..LANES / BLOCK {
                 let index = addresses.block(state, chunk, block);
@@ -329,6 +375,14 @@ impl<N: Number> TieredStep<N> for Store {
                     index[k] |= !active[k];
                 }
             }
+            if instr.first {
+                for row in index.as_chunks::<ROW>().0 {
+                    if row[0] != OUTSIDE {
+                        let next = row[0].wrapping_add(state.width()) as usize;
+                        I::prefetch(address(texture.texels, next));
+                    }
+                }
+            }
             // Not by a closure, which would not be compiled for the tier.
             let mut channels = [[0; LANES]; 4];
             for (channel, value) in channels.iter_mut().zip(value) {
@@ -336,6 +390,9 @@ impl<N: Number> TieredStep<N> for Store {
             }
             put::<I, LANES>(texture, &index, &channels);
             if let (true, Some(wide)) = (N::WIDE, texture.wide) {
+                if instr.first {
+                    wide::ask_ahead::<I, LANES>(wide, &index, state.width());
+                }
                 wide::store::<I, N>(state, wide, texture.desc().format, &index, value, chunk);
             }
         }

@@ -14,9 +14,10 @@
 
 use super::link::Operand;
 use super::state::State;
+use crate::ir::chain::Chained;
 use crate::num::{Number, Shadow};
 pub(super) use crate::registers::BLOCK;
-use crate::registers::{ClassOf, LANES, Lane};
+use crate::registers::{ClassOf, Float, Int, LANES, Lane};
 
 type LanesOf<L> = <L as Lane>::Lanes;
 type BlockOf<L> = <L as Lane>::Block;
@@ -325,6 +326,49 @@ pub(super) fn update2<N, CA, CB, CD, A, B>(
                 CB::Lane::of_block(&b, k),
             );
             CD::Lane::set_in_block(&mut new, k, value);
+        }
+        new
+    });
+}
+
+/// What a chain computes of the registers of these numbers, lane by lane.
+#[inline(always)]
+pub(super) fn map_chain<N, O, const STEPS: bool, const V: usize, const F: usize, const I: usize>(
+    state: &mut State<'_, N>,
+    d: u16,
+    lanes: &[u16; V],
+    numbers: &[u16; F],
+    bits: &[u16; I],
+) where
+    N: Number,
+    O: Chained<N, V, F, I>,
+{
+    let number = |number, varying| Operand { number, varying };
+    let none = Varying::<N>(std::ptr::null());
+    let (mut sources, mut same, mut same_bits) = ([none; V], [N::default(); F], [0; I]);
+    for k in 0..V {
+        sources[k] = <Varying<N> as Source<N, Float>>::open(state, number(lanes[k], true));
+    }
+    for k in 0..F {
+        let one = <Uniform<N> as Source<N, Float>>::open(state, number(numbers[k], false));
+        same[k] = one.0;
+    }
+    for k in 0..I {
+        let one = <Uniform<u32> as Source<N, Int>>::open(state, number(bits[k], false));
+        same_bits[k] = one.0;
+    }
+    blocks!(state, Float, d, |entry, lane, _old| {
+        let mut from = [N::default().splat(); V];
+        for k in 0..V {
+            from[k] = <Varying<N> as Source<N, Float>>::block(sources[k], entry, lane);
+        }
+        let mut new = N::default().splat();
+        for k in 0..BLOCK {
+            let mut values = [N::default(); V];
+            for v in 0..V {
+                values[v] = N::of_block(&from[v], k);
+            }
+            N::set_in_block(&mut new, k, O::eval::<STEPS>(values, same, same_bits));
         }
         new
     });

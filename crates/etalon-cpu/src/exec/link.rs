@@ -5,7 +5,9 @@ use super::lanes::BLOCK;
 use super::profile::Watch;
 use super::state::{Failure, State};
 use super::tier::{Handler, Step, Tier};
-use super::{check, half, image, memory, perturb, probe, sample, stage, subgroup, texel_atomic};
+use super::{
+    chain, check, half, image, memory, perturb, probe, sample, stage, subgroup, texel_atomic,
+};
 use crate::code::{Code, CodeInst, End};
 use crate::ir::{Input, Op};
 use crate::num::Number;
@@ -22,6 +24,9 @@ pub(super) struct Instr {
     pub(super) e: u16,
     /// A bit for each of the four that is a register of lanes.
     varying: u8,
+    /// Whether no other in the kernel reads or writes the same texture before it, and
+    /// no loop repeats it.
+    pub(super) first: bool,
     /// Index in [`Code::insts`].
     pub(super) index: u32,
 }
@@ -45,6 +50,26 @@ impl Instr {
     }
 }
 
+impl Instr {
+    /// This one for a chain, whose operands begin at this place of
+    /// [`Code::operands`]: all of them next to each other and to those of others,
+    /// since reading them where each instruction keeps its own leaves less of the
+    /// nearest cache to lanes.
+    fn of_chain(self, at: u32) -> Self {
+        Self {
+            a: at as u16,
+            b: (at >> 16) as u16,
+            ..self
+        }
+    }
+
+    /// Where a chain's operands begin.
+    #[inline(always)]
+    pub(super) fn chain_operands(&self) -> usize {
+        usize::from(self.a) | usize::from(self.b) << 16
+    }
+}
+
 /// A program linked to the handlers of an instruction set.
 #[derive(Debug)]
 pub(crate) struct Linked<N: Number> {
@@ -55,6 +80,8 @@ pub(crate) struct Linked<N: Number> {
 
 impl<N: Number> Linked<N> {
     pub(crate) fn new(code: &Code, tier: Tier) -> Self {
+        let first = first_of_texture(code);
+        let mut chained = 0;
         let calls = code
             .insts
             .iter()
@@ -78,7 +105,16 @@ impl<N: Number> Linked<N> {
                     c: operand(2),
                     e: operand(3),
                     varying: varying(0) | varying(1) | varying(2) | varying(3),
+                    first: first[index],
                     index: index as u32,
+                };
+                let instr = match inst.op {
+                    Op::Chain(_) => {
+                        let at = chained;
+                        chained += inst.operands.len() as u32;
+                        instr.of_chain(at)
+                    }
+                    _ => instr,
                 };
                 (handler(inst, tier), instr)
             })
@@ -164,6 +200,29 @@ impl<N: Number> Linked<N> {
     }
 }
 
+/// Of each instruction whether it is the first load or store of a texture, outside of
+/// loops.
+fn first_of_texture(code: &Code) -> Vec<bool> {
+    let mut first = vec![false; code.insts.len()];
+    let mut seen = Vec::new();
+    for (index, inst) in code.insts.iter().enumerate() {
+        if let Op::ImageLoad { access, .. } | Op::ImageStore { access, .. } = inst.op
+            && !seen.contains(&access.image)
+        {
+            seen.push(access.image);
+            first[index] = true;
+        }
+    }
+    for (last, block) in code.blocks.iter().enumerate() {
+        if let End::Again { head, .. } = block.end {
+            for block in code.blocks.get(head as usize..=last).unwrap_or_default() {
+                first[block.start as usize..block.stop as usize].fill(false);
+            }
+        }
+    }
+    first
+}
+
 fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
     let varying_result = inst.results.iter().flatten().any(|slot| slot.varying);
     match inst.op {
@@ -179,6 +238,7 @@ fn handler<N: Number>(inst: &CodeInst, tier: Tier) -> Handler<N> {
                 varying: &varying,
             })
         }
+        Op::Chain(op) => op.visit(chain::Select { tier }),
         Op::Move(class) => arith::copy(
             tier,
             class,

@@ -9,6 +9,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod arith;
+mod chain;
 mod check;
 mod dispatch;
 #[allow(unsafe_code)]

@@ -24,6 +24,8 @@ pub(crate) struct LocalIds {
     pub(crate) ids: [Vec<Lanes<u32>>; 4],
     /// All ones where there is an invocation.
     pub(crate) active: Vec<Lanes<u32>>,
+    /// Invocations next to each other in x.
+    pub(crate) width: u32,
 }
 
 impl LocalIds {
@@ -50,6 +52,7 @@ impl LocalIds {
                 lanes(&at),
             ],
             active: lanes(&|i| crate::num::mask(i < count)),
+            width: size[0],
         }
     }
 }
@@ -130,6 +133,14 @@ impl<'a, N: Number> State<'a, N> {
     #[inline(always)]
     pub(crate) fn group_in_batch(&self, chunk: usize) -> u32 {
         ((self.first_chunk + chunk) / self.local_ids.active.len()) as u32
+    }
+
+    /// How many invocations of the batch are next to each other in x, if it is of
+    /// whole workgroups.
+    #[inline(always)]
+    pub(crate) fn width(&self) -> u32 {
+        let groups = self.chunks / self.local_ids.active.len().max(1);
+        self.local_ids.width.wrapping_mul(groups as u32)
     }
 
     /// Where a chunk of a register of lanes is.
@@ -331,6 +342,25 @@ impl<'a, N: Number> State<'a, N> {
             let value = N::from_both(f32::from_bits(singles[0]), doubles[0]);
             self.registers.uniform_floats[usize::from(slot.number)] = value;
         }
+    }
+
+    /// A block of [`State::set_both`] in a register of lanes, both as bits.
+    #[inline(always)]
+    pub(crate) fn set_both_block(
+        &mut self,
+        slot: Slot,
+        chunk: usize,
+        block: usize,
+        singles: [u32; BLOCK],
+        doubles: [u64; BLOCK],
+    ) {
+        let at = self.at(slot.number, chunk);
+        let mut numbers = N::default().splat();
+        for k in 0..BLOCK {
+            let (single, double) = (f32::from_bits(singles[k]), f64::from_bits(doubles[k]));
+            N::set_in_block(&mut numbers, k, N::from_both(single, double));
+        }
+        N::set_block(&mut self.registers.floats[at], block * BLOCK, numbers);
     }
 
     /// The lanes that take part in an instruction.

@@ -42,6 +42,18 @@ word!(AtomicU16, u16);
 word!(AtomicU32, u32);
 word!(AtomicU64, u64);
 
+/// Where a texel would be, whether or not it is there.
+#[inline(always)]
+pub(super) fn address(texels: &Texels, at: usize) -> *const u8 {
+    match texels {
+        Texels::B1(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B2(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B4(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B8(words) => words.as_ptr().wrapping_add(at).cast(),
+        Texels::B16(words) => words.as_ptr().wrapping_add(at.wrapping_mul(2)).cast(),
+    }
+}
+
 /// Whether every index, `per` words each, is in `words`.
 #[inline(always)]
 fn all_inside<W, const K: usize>(words: &[W], index: &[u32; K], per: usize) -> bool {
@@ -123,6 +135,18 @@ macro_rules! in_words {
 
 in_words!(load4, store4, AtomicU32, u32);
 in_words!(load8, store8, AtomicU64, u64);
+
+/// A block of words, if all are inside.
+#[inline(always)]
+pub(super) fn block8<I: Isa>(words: &[AtomicU64], index: [u32; BLOCK]) -> Option<[u64; BLOCK]> {
+    let count = i32::try_from(words.len()).unwrap_or(0) as u32;
+    if !I::all_below(index, count) {
+        return None;
+    }
+    // SAFETY: all indices were seen to be inside, and atomics are laid out as what
+    // they hold.
+    Some(unsafe { I::load8(words.as_ptr().cast(), words.len(), index) })
+}
 
 /// [`load`] where a texel has two words.
 #[inline(always)]

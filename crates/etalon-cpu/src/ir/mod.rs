@@ -6,6 +6,7 @@
 //! carries data around loops and out of branches.
 
 pub(crate) mod arith;
+pub(crate) mod chain;
 mod check;
 mod op;
 mod probe;

@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::chain::Chain;
 use super::subgroup::SubgroupFunction;
 use super::{Arith, Check, Class, Perturbed};
 
@@ -101,6 +102,7 @@ pub(crate) enum ImageQuery {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Op {
     Arith(Arith),
+    Chain(Chain),
     Input(Input),
     /// Copies the operand: what variables become.
     Move(Class),
@@ -230,6 +232,7 @@ impl Op {
             Self::BufferLoad { constant, .. } => constant,
             Self::ImageLoad { level, .. } => level,
             Self::Arith(_)
+            | Self::Chain(_)
             | Self::Perturb(_)
             | Self::Input(_)
             | Self::Table { .. }
@@ -332,6 +335,7 @@ impl fmt::Display for Op {
         }
         match *self {
             Self::Arith(arith) => f.write_str(arith.mnemonic()),
+            Self::Chain(chain) => f.write_str(chain.mnemonic()),
             Self::Input(input) => match input {
                 Input::LocalId(a) => write!(f, "local_id.{}", axis(a)),
                 Input::LocalIndex => f.write_str("local_index"),

@@ -218,7 +218,8 @@ impl Fuser {
     }
 }
 
-fn uses(flat: &Flat) -> Vec<u32> {
+/// How often each register is read.
+pub(super) fn uses(flat: &Flat) -> Vec<u32> {
     let mut uses = vec![0_u32; flat.regs.len()];
     let insts = flat
         .prologue

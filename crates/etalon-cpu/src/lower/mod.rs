@@ -2,6 +2,7 @@
 //! registers.
 
 mod allocate;
+mod chains;
 mod coalesce;
 mod flat;
 mod flatten;
@@ -24,6 +25,7 @@ pub(crate) fn lower(mut tree: Tree, partial: bool) -> Flat {
     numbers::compare_numbers(&mut flat);
     fuse::superinstructions(&mut flat);
     limits::limit_numbers(&mut flat);
+    chains::join(&mut flat);
     coalesce::coalesce(&mut flat);
     flat
 }

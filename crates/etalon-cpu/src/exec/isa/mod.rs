@@ -123,6 +123,13 @@ pub(crate) unsafe trait Isa: 'static {
         }
     }
 
+    /// Asks for what is at an address, which need not be anyone's: to be in the
+    /// caches when it is read or written.
+    #[inline(always)]
+    fn prefetch(address: *const u8) {
+        let _ = address;
+    }
+
     /// Whether all of them are below `count`.
     #[inline(always)]
     fn all_below(index: [u32; BLOCK], count: u32) -> bool {

@@ -5,7 +5,18 @@ use std::mem::transmute;
 
 use super::{BLOCK, Isa};
 
-/// Stores of all tiers.
+/// What all tiers have.
+macro_rules! prefetches {
+    () => {
+        #[inline(always)]
+        fn prefetch(address: *const u8) {
+            // SAFETY: a hint, which no address makes fail.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(address.cast()) };
+        }
+    };
+}
+
+/// Stores of the lower tiers.
 macro_rules! stores_in_runs {
     () => {
         #[inline(always)]
@@ -38,6 +49,8 @@ macro_rules! with_sse2 {
             unsafe { load_pairs(words, index) }
         }
 
+        prefetches!();
+
         stores_in_runs!();
 
         #[inline(always)]
@@ -66,30 +79,6 @@ pub(crate) struct Avx2;
 // SAFETY: AVX2 and F16C, which the tier has.
 unsafe impl Isa for Avx2 {
     with_sse2!();
-
-    #[inline(always)]
-    unsafe fn load_parts(
-        words: *const u64,
-        count: usize,
-        index: [u32; BLOCK],
-    ) -> [[u16; BLOCK]; 4] {
-        // SAFETY: the instructions are there; the caller's promise; the runs'
-        // last indices are of them.
-        unsafe {
-            let [low, high]: [__m256i; 2] = transmute(index);
-            let (Some(first), Some(second)) = (run(low), run(high)) else {
-                return Self::split(Self::load8(words, count, index));
-            };
-            let [red_green, blue_alpha] = parts_of_run(words.add(first));
-            let [red_green_2, blue_alpha_2] = parts_of_run(words.add(second));
-            transmute([
-                _mm256_permute2x128_si256::<0x20>(red_green, red_green_2),
-                _mm256_permute2x128_si256::<0x31>(red_green, red_green_2),
-                _mm256_permute2x128_si256::<0x20>(blue_alpha, blue_alpha_2),
-                _mm256_permute2x128_si256::<0x31>(blue_alpha, blue_alpha_2),
-            ])
-        }
-    }
 
     #[inline(always)]
     unsafe fn load_halves(
@@ -141,21 +130,6 @@ unsafe impl Isa for Avx2 {
     }
 }
 
-/// Where eight words next to each other begin, if the indices are of such.
-///
-/// # Safety
-/// There is AVX2.
-#[inline(always)]
-unsafe fn run(index: __m256i) -> Option<usize> {
-    // SAFETY: the caller's promise.
-    unsafe {
-        let first = _mm256_broadcastd_epi32(_mm256_castsi256_si128(index));
-        let is_run = _mm256_cmpeq_epi32(_mm256_add_epi32(first, steps()), index);
-        let first = _mm256_cvtsi256_si32(index) as u32 as usize;
-        (_mm256_movemask_epi8(is_run) == -1).then_some(first)
-    }
-}
-
 /// 0 to 7.
 ///
 /// # Safety
@@ -174,9 +148,11 @@ unsafe fn steps() -> __m256i {
 unsafe fn parts_of_run(words: *const u64) -> [__m256i; 2] {
     // SAFETY: the caller's promise.
     unsafe {
-        let low = _mm256_loadu_si256(words.cast());
-        let high = _mm256_loadu_si256(words.add(4).cast());
-        parts_of_words(low, high)
+        let (near, far) = (two_pairs::<4>(words), two_pairs::<4>(words.add(2)));
+        parts_of_twos(
+            _mm256_unpacklo_epi16(near, far),
+            _mm256_unpackhi_epi16(near, far),
+        )
     }
 }
 
@@ -188,42 +164,43 @@ unsafe fn parts_of_run(words: *const u64) -> [__m256i; 2] {
 unsafe fn parts_of_every_other(words: *const u64) -> [__m256i; 2] {
     // SAFETY: the caller's promise.
     unsafe {
-        let low = _mm256_unpacklo_epi64(distant_pairs(words), distant_pairs(words.add(2)));
-        let words = words.add(8);
-        let high = _mm256_unpacklo_epi64(distant_pairs(words), distant_pairs(words.add(2)));
-        parts_of_words(low, high)
+        // The upper word of each pair is left.
+        let [a, b] = [two_pairs::<8>(words), two_pairs::<8>(words.add(2))];
+        let [c, d] = [two_pairs::<8>(words.add(4)), two_pairs::<8>(words.add(6))];
+        parts_of_twos(_mm256_unpacklo_epi16(a, c), _mm256_unpacklo_epi16(b, d))
     }
 }
 
-/// Words 0 and 1, 4 and 5.
+/// Two words and two more `FAR` from them. From memory, which costs no shuffle.
 ///
 /// # Safety
 /// There is AVX2; the words are there.
 #[inline(always)]
-unsafe fn distant_pairs(words: *const u64) -> __m256i {
+unsafe fn two_pairs<const FAR: usize>(words: *const u64) -> __m256i {
     // SAFETY: the caller's promise.
     unsafe {
         let near = _mm256_castsi128_si256(_mm_loadu_si128(words.cast()));
-        _mm256_inserti128_si256::<1>(near, _mm_loadu_si128(words.add(4).cast()))
+        _mm256_inserti128_si256::<1>(near, _mm_loadu_si128(words.add(FAR).cast()))
     }
 }
 
-/// Of eight words, the first two parts and the last two.
+/// Of eight words, the first two parts and the last two, from each part of words 0
+/// and 2 next to each other, and of words 1 and 3; in the upper halves of words 4
+/// to 7.
+///
+/// The shuffles stay within halves of registers but for the last, of quarters:
+/// what compilers make of others that cross takes three times as long.
 ///
 /// # Safety
 /// There is AVX2.
 #[inline(always)]
-unsafe fn parts_of_words(low: __m256i, high: __m256i) -> [__m256i; 2] {
+unsafe fn parts_of_twos(even: __m256i, odd: __m256i) -> [__m256i; 2] {
+    const QUARTERS: i32 = 0b11_01_10_00;
     // SAFETY: the caller's promise.
     unsafe {
-        // Of words 0, 4, 1, 5 in the lower half and 2, 6, 3, 7 in the upper one,
-        // two of a part next to each other; then four.
-        let even = _mm256_unpacklo_epi16(low, high);
-        let odd = _mm256_unpackhi_epi16(low, high);
-        let order = _mm256_setr_epi32(0, 4, 1, 5, 2, 6, 3, 7);
         [
-            _mm256_permutevar8x32_epi32(_mm256_unpacklo_epi16(even, odd), order),
-            _mm256_permutevar8x32_epi32(_mm256_unpackhi_epi16(even, odd), order),
+            _mm256_permute4x64_epi64::<QUARTERS>(_mm256_unpacklo_epi16(even, odd)),
+            _mm256_permute4x64_epi64::<QUARTERS>(_mm256_unpackhi_epi16(even, odd)),
         ]
     }
 }
@@ -310,6 +287,8 @@ pub(crate) struct Avx512;
 
 // SAFETY: the instructions are those that the tier has.
 unsafe impl Isa for Avx512 {
+    prefetches!();
+
     /// As [`load_near`], for the two halves at once.
     #[inline(always)]
     unsafe fn load4(words: *const u32, count: usize, index: [u32; BLOCK]) -> [u32; BLOCK] {

@@ -11,6 +11,7 @@ use super::Request;
 use super::axis::{AxisTexels, MAX_FAST_SIZE};
 use crate::code::Slot;
 use crate::exec::formats::{BlockFormat, WithFormat, with_format};
+use crate::exec::image::four;
 use crate::exec::isa::Isa;
 use crate::exec::lanes::BLOCK;
 use crate::exec::state::State;
@@ -38,17 +39,13 @@ pub(super) fn sample<I: Isa, N: Number>(
     let Some(level) = request.bilinear_level(lod) else {
         return false;
     };
-    let mut to = [None; 4];
-    for (to, result) in to.iter_mut().zip(results) {
-        *to = *result;
-    }
     let [offset_x, offset_y, _] = request.offset;
     let blocks = Bilinear::<N, I> {
         state,
         level,
         coordinates: [x, y],
         offset: [offset_x, offset_y],
-        results: to,
+        results: four(results),
         isa: PhantomData,
     };
     with_format(request.texture, blocks).is_none()

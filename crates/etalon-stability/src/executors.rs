@@ -59,6 +59,12 @@ impl Kind {
         }
     }
 
+    /// Whether it takes ten times as long as others.
+    #[must_use]
+    pub const fn is_costly(self) -> bool {
+        matches!(self, Self::Sanitiser | Self::Perturbed)
+    }
+
     /// Whether it is a device, to be held to the interpreter.
     #[must_use]
     pub const fn is_device(self) -> bool {

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use etalon_stability::executors::Kind;
 use etalon_stability::plant::Plant;
-use etalon_stability::run::{Options, Progress, run};
+use etalon_stability::run::{FOLLOWED, Options, Progress, run};
 use etalon_stability::{kernels, mutate, report, table};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -35,6 +35,10 @@ struct Arguments {
     /// Most texels of a frame; larger cases are left out.
     #[arg(long)]
     largest: Option<usize>,
+    /// Most texels of a frame for the sanitiser and perturbed executions, which take ten
+    /// times as long as the others.
+    #[arg(long, default_value_t = FOLLOWED)]
+    followed: usize,
     /// Write a page with all cases, the worst first, here.
     #[arg(long)]
     report: Option<PathBuf>,
@@ -90,6 +94,7 @@ impl Arguments {
             effects: self.effect,
             executors: self.executor,
             largest: self.largest,
+            followed: self.followed,
             kernels,
             plant: self.plant,
         };

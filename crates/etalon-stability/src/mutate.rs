@@ -93,6 +93,7 @@ pub fn mutate(
     let mut options = Options {
         executors: vec![Kind::Cpu, Kind::Sanitiser],
         largest: Some(largest),
+        followed: largest,
         ..Options::default()
     };
     let digests = |options: &Options| {

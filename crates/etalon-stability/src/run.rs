@@ -27,6 +27,9 @@ use crate::plant::Plant;
 use crate::sanitise::{AllowError, Counts, Watch};
 use crate::subject::{Subject, SubjectError, subjects};
 
+/// Default of [`Options::followed`].
+pub const FOLLOWED: usize = 1024;
+
 /// What is run.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -42,6 +45,9 @@ pub struct Options {
     pub largest: Option<usize>,
     /// Kernels in place of those built in: see [`kernels`](crate::kernels).
     pub kernels: Vec<(String, String)>,
+    /// Most texels of a frame that the sanitiser and perturbed executions are run on:
+    /// they take ten times as long as the others.
+    pub followed: usize,
     /// A fault to be found.
     pub plant: Option<Plant>,
 }
@@ -53,6 +59,7 @@ impl Default for Options {
             effects: Vec::new(),
             executors: Kind::ALL.to_vec(),
             largest: None,
+            followed: FOLLOWED,
             kernels: Vec::new(),
             plant: None,
         }
@@ -159,6 +166,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
                 steps: &steps,
                 kernels: &kernels,
                 plant: options.plant,
+                followed: pixels <= options.followed,
             };
             report.cases.push(pair.run(&mut executors, &mut watch));
         }
@@ -266,6 +274,8 @@ struct Pair<'a> {
     steps: &'a [Step],
     kernels: &'a KernelLibrary,
     plant: Option<Plant>,
+    /// Whether the frame is small enough for [`Kind::is_costly`].
+    followed: bool,
 }
 
 /// What all frames of a case stored.
@@ -323,6 +333,9 @@ impl Pair<'_> {
         };
         let mut kept = Kept::default();
         for executor in executors {
+            if executor.kind.is_costly() && !self.followed {
+                continue;
+            }
             let result = self.on(executor, watch, &mut kept, &mut report.findings);
             report.results.push(result);
         }

@@ -8,7 +8,7 @@ use super::{Case, CaseError, FrameSource, Step};
 /// The side of a picture with a texel for each pattern of 16 bits.
 const SIDE: u32 = 256;
 
-const CODES: &str = "NUMERICS, 4: finite output for any bit pattern; gpuweb/gpuweb#5192";
+const CODES: &str = "gpuweb/gpuweb#5192 (min, max and clamp may lose NaN); IEEE 754 binary16";
 
 /// Each of the 65,536 half floats once.
 fn every_half(place: fn(f32, Texel) -> Texel) -> Result<Vec<Step>, CaseError> {

@@ -114,7 +114,7 @@ pub(super) const CASES: &[Case] = &[
     Case::new(
         "depth-zero",
         "cleared, reversed: the distance is near / 0, and the sky has no position",
-        "bevyengine/bevy reversed-Z; NUMERICS: sky depth 0 gives a position at infinity",
+        "N. Reed, Depth Precision Visualized, 2015 (reversed, infinite)",
         || flat(Canvas::small(), 0.0),
     ),
     Case::new(

@@ -300,7 +300,7 @@ pub(super) const CASES: &[Case] = &[
     Case::new(
         "light-hues-in-packed-floats",
         "steps of 1/64 in red and green and 1/32 in blue: hues drift over the mips",
-        "NUMERICS: R11G11B10 has 6, 6 and 5 bits",
+        "Khronos Data Format Specification, 10 (unsigned 11- and 10-bit floats)",
         || lit(|spot| [3.0 + spot.uv.x as f32, 3.0 + spot.uv.y as f32, 3.5, 1.0]),
     )
     .on(&["bloom"])

@@ -27,7 +27,7 @@ pub(super) const CASES: &[Case] = &[
     Case::new(
         "material-mirror",
         "roughness 0 and f0 1: D is infinite at N·H = 1 for perceptual roughness up to 0.0131",
-        "Filament, 4.4.1 (roughness clamped to 0.045); NUMERICS: NH*a2 - NH rounds away",
+        "Filament, 4.4.1 (roughness clamped to 0.045; 1 - NH² as |N × H|²)",
         || shining(|_| [1.0, 1.0, 1.0, 1.0]),
     ),
     Case::new(

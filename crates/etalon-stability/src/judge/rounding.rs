@@ -3,7 +3,7 @@
 //! The shadow is the `f64` that takes the same branches as the `f32` beside it, so
 //! that what is left is rounding. Its error at a store is the distance between what
 //! was stored and the shadow, less the half step that storing to the format may move
-//! it, relative to the shadow or to the channel's [scale](super::scale). Where a
+//! it, relative to the shadow or to the channel's [scale]. Where a
 //! strict kernel has rounded to whole codes itself, so has its shadow: a half step
 //! each.
 //!

@@ -31,8 +31,9 @@ fn header(body: &mut String, report: &Report) {
     let verdict = if report.is_sound() {
         "<span class=\"badge\">nothing found</span>".to_owned()
     } else {
+        let plural = if totals.findings == 1 { "" } else { "s" };
         format!(
-            "<span class=\"badge bad\">{} findings</span>",
+            "<span class=\"badge bad\">{} finding{plural}</span>",
             totals.findings
         )
     };

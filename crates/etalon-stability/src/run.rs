@@ -28,7 +28,7 @@ use crate::sanitise::{AllowError, Counts, Watch};
 use crate::subject::{Subject, SubjectError, subjects};
 
 /// Default of [`Options::followed`].
-pub const FOLLOWED: usize = 1024;
+pub const FOLLOWED: usize = 2048;
 
 /// What is run.
 #[derive(Clone, Debug)]

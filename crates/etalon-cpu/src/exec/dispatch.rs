@@ -146,7 +146,9 @@ impl Executor {
     /// [`TranslateOptions::perturb`](crate::TranslateOptions::perturb) within what WGSL
     /// allows a device (§15.7.4): roundings go either way, sums of products may be fused,
     /// subnormal numbers may be flushed to zero, functions are off by up to what their
-    /// accuracy says. Each seed is another such device; the same seed is the same one.
+    /// accuracy says. Each seed is another such device; the same seed is the same one. Of
+    /// seed 0 and 1 it has habits: all towards 0, and all away from it. The others do
+    /// this or that.
     /// What several of them make of a picture says how much of it is not determined by
     /// the kernel, as Verrou does for programs (F. Févotte and B. Lathuilière, 2016): it
     /// is a sample, and no bound. Orders of summation are not changed. In `f32`; other

@@ -3,7 +3,7 @@
 //! WGSL leaves the direction of rounding, the fusing of products into sums, the flushing
 //! of subnormal numbers and some units in the last place of functions to devices. The
 //! interpreter runs a case several times, each time as another such device
-//! ([`etalon_cpu::CpuOptions::perturbs`]): how far its texels move is how far a device's may be,
+//! ([`etalon_cpu::CpuOptions::perturbs`]), two of which always round the same way: how far its texels move is how far a device's may be,
 //! texel by texel, without a tolerance that anybody chose.
 //!
 //! It samples and does not bound. An error that is spread evenly over an interval is

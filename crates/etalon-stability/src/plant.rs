@@ -14,7 +14,7 @@ pub enum Fault {
     Nan,
     /// A bit of a texel of the last pass is turned.
     Bit,
-    /// A texel's shadow is moved by a hundredth of its value.
+    /// The first texel of the first pass is off by a hundredth, and its shadow is not.
     Error,
 }
 
@@ -79,10 +79,14 @@ impl Fault {
                 }
             }
             Self::Error => {
-                let texels = stores.iter_mut().filter_map(|store| store.wide.as_mut());
-                let brightest = texels.flatten().max_by(|a, b| a[0].total_cmp(&b[0]));
-                if let Some(texel) = brightest {
+                let first = stores.iter_mut().find_map(|store| store.image.as_mut());
+                let Some(image) = first else { return };
+                let format = image.desc.format;
+                let size = format.texel_bytes() as usize;
+                if let Some(bytes) = image.bytes.get_mut(..size) {
+                    let mut texel = format.decode(bytes).to_f32();
                     texel[0] = texel[0] * 1.01 + 0.01;
+                    format.encode(Texel::Float(texel), bytes);
                 }
             }
         }

@@ -99,15 +99,26 @@ fn row(body: &mut String, finding: &Finding) {
     let _ = writeln!(
         body,
         "</td><td>{}</td><td class=\"number\" title=\"in {} cases\">{} of {}</td><td class=\"number\">{severity}</td>\
-         <td class=\"number\">{:.3e}</td><td class=\"number\">{:.3e}</td><td class=\"number\">{:.2}</td>\
+         <td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{:.2}</td>\
          <td class=\"number\">{}</td><td>{map}</td></tr>",
         escape(&finding.fault),
         finding.cases,
         finding.times,
         finding.executions,
-        finding.max_ulps,
-        finding.p99_ulps,
+        units(finding.max_ulps),
+        units(finding.p99_ulps),
         finding.introduced_ulps,
         finding.cancelled_bits,
     );
+}
+
+/// Units in the last place; from where not even the exponent is right, that.
+fn units(ulps: f64) -> String {
+    if ulps >= 16_777_216.0 {
+        "all".to_owned()
+    } else if ulps >= 1000.0 {
+        format!("{ulps:.0}")
+    } else {
+        format!("{ulps:.2}")
+    }
 }

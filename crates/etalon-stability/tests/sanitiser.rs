@@ -67,10 +67,10 @@ fn a_guard_that_is_missing_is_found_at_its_line() {
         .position(|line| line.contains("most = brightness"));
     let line = line.unwrap() as u32 + 1;
     assert!((line..line + 8).contains(&site.line), "{site:?}");
-    // Without the sanitiser the picture has a NaN, too: it was stored.
-    assert!(
-        report
-            .findings()
-            .any(|(_, finding)| finding.kind == FindingKind::NonFinite)
-    );
+    // In what the interpreter stores there is no trace of it: rounding to 16 bits takes a
+    // NaN for 0.
+    let seen = |(_, finding): (_, &etalon_stability::model::Finding)| {
+        finding.kind == FindingKind::NonFinite && finding.executor == "cpu"
+    };
+    assert!(!report.findings().any(seen));
 }

@@ -102,7 +102,7 @@ impl Kept {
 /// Kernels of fewer instructions are left out: starting them takes a few hundred
 /// instructions more or less each time, as threads meet or miss each other,
 /// which is under 0.2 % of this.
-const FEWEST: u64 = 100_000;
+const FEWEST: u64 = 250_000;
 
 /// Part by which counts may differ from those kept.
 const MARGIN: f64 = 0.03;

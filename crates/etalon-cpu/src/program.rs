@@ -44,7 +44,7 @@ pub struct TranslateOptions {
     /// trace of them in its code.
     pub checks: Checks,
     /// Whether the numerical [sanitiser](crate::sanitise) follows what it computes, in
-    /// executions of [`NumberType::Shadow`]. They take some ten times as long.
+    /// executions of [`NumberType::Shadow`]. They take some hundreds of times as long.
     pub sanitise: bool,
     /// Whether results can be moved within what WGSL allows, see
     /// [`Executor::with_perturbation`].

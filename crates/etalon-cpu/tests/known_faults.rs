@@ -10,20 +10,6 @@ use common::*;
 use etalon_cpu::sanitise::Fault;
 use etalon_cpu::{BoundResource, Executor, NumberType, TranslateOptions};
 
-fn kernel(functions: &str, body: &str) -> String {
-    format!(
-        "@group(0) @binding(0) var<storage, read> data: array<f32>;
-@group(0) @binding(1) var<storage, read_write> result: array<f32>;
-{functions}
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
-    let i = id.x;
-    let x = data[i];
-{body}
-}}
-"
-    )
-}
-
 fn run(wgsl: &str, data: &[f32]) -> Vec<f32> {
     let bits: Vec<u32> = data.iter().map(|x| x.to_bits()).collect();
     let words = run_buffers(wgsl, &bits, data.len(), data.len() as u32 / 64);

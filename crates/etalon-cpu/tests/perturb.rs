@@ -6,17 +6,9 @@ mod common;
 use common::*;
 use etalon_cpu::{BoundResource, Executor, TranslateOptions};
 
-fn kernel(body: &str) -> String {
-    format!(
-        "@group(0) @binding(0) var<storage, read> data: array<f32>;
-@group(0) @binding(1) var<storage, read_write> result: array<f32>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
-    let i = id.x;
-    let x = data[i];
-{body}
-}}
-"
-    )
+/// [`kernel`] without functions of its own.
+fn body(body: &str) -> String {
+    kernel("", body)
 }
 
 fn perturbed(wgsl: &str, data: &[f32], executor: &Executor) -> Vec<f32> {
@@ -71,14 +63,14 @@ const LONG: &str = "    var s = x;
 
 #[test]
 fn without_a_seed_nothing_moves() {
-    let wgsl = kernel(LONG);
+    let wgsl = body(LONG);
     let still = perturbed(&wgsl, &data(), &Executor::new(1).unwrap());
     assert_eq!(still, plain(&wgsl, &data()));
 }
 
 #[test]
 fn a_seed_is_a_device_on_any_number_of_threads_and_lanes() {
-    let wgsl = kernel(LONG);
+    let wgsl = body(LONG);
     let first = perturbed(&wgsl, &data(), &seeded(5));
     assert_ne!(first, plain(&wgsl, &data()));
     assert_ne!(first, perturbed(&wgsl, &data(), &seeded(6)));
@@ -90,7 +82,7 @@ fn a_seed_is_a_device_on_any_number_of_threads_and_lanes() {
 
 #[test]
 fn equal_operands_give_equal_results_in_all_invocations() {
-    let wgsl = kernel("    let y = 1.1 + 0.0 * x;\n    result[i] = sin(y) / 3.0;");
+    let wgsl = body("    let y = 1.1 + 0.0 * x;\n    result[i] = sin(y) / 3.0;");
     for seed in 0..4 {
         let results = perturbed(&wgsl, &data(), &seeded(seed));
         assert!(results.iter().all(|&result| result == results[0]));
@@ -99,7 +91,7 @@ fn equal_operands_give_equal_results_in_all_invocations() {
 
 #[test]
 fn what_is_exact_stays() {
-    let wgsl = kernel(
+    let wgsl = body(
         "    let n = f32(i);
     result[i] = max(floor((n * 2.0 + 1.0) * 0.5), 1.0) - n + abs(-n) * 4.0;",
     );
@@ -114,10 +106,10 @@ fn what_is_exact_stays() {
 #[test]
 fn spread_is_that_of_the_table() {
     // Two roundings to either side.
-    let sum = spread(&kernel("    result[i] = (x + 0.3) * 1.7;"), &data());
+    let sum = spread(&body("    result[i] = (x + 0.3) * 1.7;"), &data());
     assert!(sum > 5e-8 && sum <= 2.5 * f64::from(f32::EPSILON), "{sum}");
     // 2.5 units of a quotient (WGSL §15.7.4.1).
-    let quotient = spread(&kernel("    result[i] = x / 3.0;"), &data());
+    let quotient = spread(&body("    result[i] = x / 3.0;"), &data());
     assert!(
         quotient > 1e-7 && quotient <= 3.0 * f64::from(f32::EPSILON),
         "{quotient}"
@@ -127,11 +119,11 @@ fn spread_is_that_of_the_table() {
 #[test]
 fn unstable_formulas_spread_widely_and_stable_ones_do_not() {
     let unstable = spread(
-        &kernel("    let a = x * 1000.0;\n    result[i] = a - sqrt(a * a - 1.0);"),
+        &body("    let a = x * 1000.0;\n    result[i] = a - sqrt(a * a - 1.0);"),
         &data(),
     );
     let stable = spread(
-        &kernel("    let a = x * 1000.0;\n    result[i] = 1.0 / (a + sqrt(a * a - 1.0));"),
+        &body("    let a = x * 1000.0;\n    result[i] = 1.0 / (a + sqrt(a * a - 1.0));"),
         &data(),
     );
     assert!(unstable > 0.1 && stable < 2e-6, "{unstable}, {stable}");

@@ -17,18 +17,9 @@ fn sanitising(wgsl: &str) -> Program {
     translate_as(wgsl, &options).unwrap_or_else(|error| panic!("{error}\n{wgsl}"))
 }
 
-/// A kernel over `data`, of which `i` is the invocation, that leaves `result`.
-fn kernel(body: &str) -> String {
-    format!(
-        "@group(0) @binding(0) var<storage, read> data: array<f32>;
-@group(0) @binding(1) var<storage, read_write> result: array<f32>;
-@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
-    let i = id.x;
-    let x = data[i];
-{body}
-}}
-"
-    )
+/// [`kernel`] without functions of its own.
+fn body(body: &str) -> String {
+    kernel("", body)
 }
 
 /// The numbers of a buffer: NaN have no bits of their own.
@@ -110,7 +101,7 @@ fn data(f: impl Fn(usize) -> f64) -> Vec<f32> {
 /// That a kernel has a fault at its mark and its stable form has none at all.
 #[track_caller]
 fn blames(fault: Fault, bad: &str, good: &str, data: &[f32]) -> Sanitised {
-    let bad = kernel(bad);
+    let bad = body(bad);
     let line = place(&bad, 0).line;
     let found = find(&bad, data);
     let site = at(&found, line, fault);
@@ -122,7 +113,7 @@ fn blames(fault: Fault, bad: &str, good: &str, data: &[f32]) -> Sanitised {
             "{other} at line {at}, not {line}"
         );
     }
-    let good = find(&kernel(good), data);
+    let good = find(&body(good), data);
     assert_eq!(faults(&good), [], "the stable form");
     found
 }
@@ -218,7 +209,7 @@ fn a_sphere_the_size_of_a_planet() {
 
 #[test]
 fn a_nan_that_is_born_and_lost() {
-    let bad = kernel(
+    let bad = body(
         "    let s = /*!*/sqrt(x);
     let t = s + 1.0;
     result[i] = /*!*/max(t, 0.0);",
@@ -240,13 +231,13 @@ fn a_nan_that_is_born_and_lost() {
         at(&found, lost, Fault::Death).deaths.first.invocation,
         [77, 0, 0]
     );
-    let good = kernel("    result[i] = sqrt(max(x, 0.0)) + 1.0;");
+    let good = body("    result[i] = sqrt(max(x, 0.0)) + 1.0;");
     assert_eq!(faults(&find(&good, &values)), []);
 }
 
 #[test]
 fn infinities_are_born_too() {
-    let bad = kernel("    result[i] = 1.0 / (1.0 + /*!*/exp(x));");
+    let bad = body("    result[i] = 1.0 / (1.0 + /*!*/exp(x));");
     let found = find(&bad, &data(|i| i as f64));
     let line = place(&bad, 0).line;
     // 1 / ∞ is 0, and nobody knows any more.
@@ -328,7 +319,7 @@ fn functions_that_blow_up_what_they_are_given() {
 
 #[test]
 fn branches_not_taken_are_not_looked_at() {
-    let wgsl = kernel(
+    let wgsl = body(
         "    var y = 1.0;
     if (x > 0.0) { y = 1.0 / x; }
     if (x > 1e30) { y = sqrt(-x); }
@@ -386,7 +377,7 @@ fn formats_say_what_is_visible() {
 
 #[test]
 fn errors_are_told_apart_as_made_and_given() {
-    let wgsl = kernel(
+    let wgsl = body(
         "    let a = x * 1.1;
     let b = a * 3.0;
     let c = b - a;
@@ -412,7 +403,7 @@ fn errors_are_told_apart_as_made_and_given() {
 
 #[test]
 fn other_programs_have_no_trace_of_it() {
-    let wgsl = kernel("    result[i] = sqrt(x);");
+    let wgsl = body("    result[i] = sqrt(x);");
     let listing = program(&wgsl).to_string();
     assert!(!listing.contains("probe"), "{listing}");
     assert!(sanitising(&wgsl).to_string().contains("probe"));

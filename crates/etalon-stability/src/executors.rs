@@ -59,7 +59,7 @@ impl Kind {
         }
     }
 
-    /// Whether it takes ten times as long as others.
+    /// Whether it takes far longer than others.
     #[must_use]
     pub const fn is_costly(self) -> bool {
         matches!(self, Self::Sanitiser | Self::Perturbed)

@@ -35,8 +35,8 @@ struct Arguments {
     /// Most texels of a frame; larger cases are left out.
     #[arg(long)]
     largest: Option<usize>,
-    /// Most texels of a frame for the sanitiser and perturbed executions, which take ten
-    /// times as long as the others.
+    /// Most texels of a frame for the sanitiser and perturbed executions, which take far
+    /// longer than the others.
     #[arg(long, default_value_t = FOLLOWED)]
     followed: usize,
     /// Write a page with all cases, the worst first, here.
@@ -49,7 +49,7 @@ struct Arguments {
     #[arg(long)]
     kernels: Option<PathBuf>,
     /// Take the guards of kernels away, one at a time, and see whether anything is found:
-    /// takes a quarter of an hour, on frames of up to 4096 texels unless `--largest` says
+    /// takes some five minutes on frames of up to 600 texels, unless `--largest` says
     /// otherwise.
     #[arg(long)]
     mutate: bool,
@@ -76,7 +76,7 @@ impl Arguments {
     fn run(self) -> Result<bool, String> {
         if self.mutate {
             let shown = ProgressBar::no_length();
-            let mutants = mutate::mutate(self.largest.unwrap_or(4096), |done, of| {
+            let mutants = mutate::mutate(self.largest.unwrap_or(600), |done, of| {
                 shown.set_length(of as u64);
                 shown.set_position(done as u64);
             });

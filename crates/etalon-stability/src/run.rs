@@ -46,7 +46,7 @@ pub struct Options {
     /// Kernels in place of those built in: see [`kernels`](crate::kernels).
     pub kernels: Vec<(String, String)>,
     /// Most texels of a frame that the sanitiser and perturbed executions are run on:
-    /// they take ten times as long as the others.
+    /// they take far longer than the others.
     pub followed: usize,
     /// A fault to be found.
     pub plant: Option<Plant>,
@@ -415,9 +415,13 @@ impl Pair<'_> {
                     kept.spread = frames.iter().map(|stores| Spread::around(stores)).collect();
                     for seed in 0..PERTURBATIONS {
                         executor.perturb(Some(seed));
-                        let moved = self.execute(executor, self.steps, arithmetic, &mut result);
-                        for (spread, stores) in kept.spread.iter_mut().zip(moved.iter().flatten()) {
-                            spread.widen(stores);
+                        match self.execute(executor, self.steps, arithmetic, &mut result) {
+                            Ok(moved) => {
+                                for (spread, stores) in kept.spread.iter_mut().zip(&moved) {
+                                    spread.widen(stores);
+                                }
+                            }
+                            Err(error) => result.status = error.status(),
                         }
                     }
                     executor.perturb(None);

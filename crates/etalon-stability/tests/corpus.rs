@@ -17,7 +17,7 @@ use etalon_stability::subject::subjects;
 const LARGEST: usize = 16_384;
 
 /// Texels up to which the sanitiser and perturbed executions are run, of which the frames
-/// of most cases have more: they take ten times as long.
+/// of most cases have more: they take far longer.
 const FOLLOWED: usize = 1024;
 
 fn sound(report: &Report) {

@@ -150,3 +150,19 @@ pub(crate) fn texture(image: &ImageData) -> Texture {
 pub(crate) fn empty(width: u32, height: u32, format: Format) -> Texture {
     Texture::zeroed(TextureDesc::d2(width, height, format)).unwrap()
 }
+
+/// A kernel over `data` (binding 0), of which invocation `i` has `x`, that leaves `result`
+/// (binding 1), after functions of its own.
+pub(crate) fn kernel(functions: &str, body: &str) -> String {
+    format!(
+        "@group(0) @binding(0) var<storage, read> data: array<f32>;
+@group(0) @binding(1) var<storage, read_write> result: array<f32>;
+{functions}
+@compute @workgroup_size(64) fn main(@builtin(global_invocation_id) id: vec3u) {{
+    let i = id.x;
+    let x = data[i];
+{body}
+}}
+"
+    )
+}

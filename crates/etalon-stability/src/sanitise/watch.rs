@@ -122,19 +122,9 @@ impl Counts {
             if !diverged.contains(&true) {
                 continue;
             }
-            let of = |stores: &[Store]| {
-                let store = stores.iter().position(|store| store.pass == step.step);
-                store.map(|at| at..at + 1)
-            };
-            let (Some(single), Some(double)) = (
-                of(single).and_then(|range| single.get(range)),
-                of(double).and_then(|range| double.get(range)),
-            ) else {
-                continue;
-            };
             let (Some(image), Some(wide)) = (
-                single.first().and_then(|store| store.image.as_ref()),
-                double.first().and_then(|store| store.wide.as_ref()),
+                find(single, &step.step).and_then(|store| store.image.as_ref()),
+                find(double, &step.step).and_then(|store| store.wide.as_ref()),
             ) else {
                 continue;
             };
@@ -152,4 +142,9 @@ impl Counts {
             self.effect.largest = self.effect.largest.max(found.largest);
         }
     }
+}
+
+/// The first that a step wrote.
+fn find<'a>(stores: &'a [Store], step: &str) -> Option<&'a Store> {
+    stores.iter().find(|store| store.pass == step)
 }

@@ -1,5 +1,5 @@
 //! What fuzzing runs: inputs on which nothing may panic. `crates/etalon-cpu/fuzz`
-//! has the targets; `tests/fuzz.rs` runs the same over a corpus and mutations
+//! has the targets; `tests/suite/fuzz.rs` runs the same over a corpus and mutations
 //! of it.
 
 use std::panic::catch_unwind;

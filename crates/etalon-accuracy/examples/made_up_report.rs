@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use etalon_accuracy::chart::{Chart, Place};
 use etalon_accuracy::report;
 
-#[path = "../tests/made_up/mod.rs"]
+#[path = "../tests/suite/made_up/mod.rs"]
 mod made_up;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

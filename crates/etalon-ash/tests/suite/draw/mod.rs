@@ -1,0 +1,5 @@
+//! Drawing.
+
+mod engine;
+mod plans;
+mod sources;

@@ -1,0 +1,8 @@
+//! Rasterising.
+
+mod coverage;
+mod input;
+mod interpolation;
+mod kernels;
+mod output;
+mod robust;

@@ -1,0 +1,5 @@
+//! The shared functions of the shaders.
+
+mod guards;
+mod math;
+mod storage;

@@ -1,0 +1,21 @@
+//! The effects on the interpreter: their pictures, truths, knobs and hard inputs.
+
+mod bloom;
+mod budget;
+mod checks;
+mod common;
+mod composite;
+mod exposure;
+mod fast;
+mod forward_plan;
+mod geometry_plan;
+mod hard_inputs;
+mod knobs;
+mod lib;
+mod metamorphic;
+mod plans;
+mod settings;
+mod ssr;
+mod ssr_colour;
+mod ssr_hard;
+mod truth;

@@ -1,0 +1,6 @@
+//! OpenEXR files.
+
+mod damage;
+mod frames;
+mod inputs;
+mod names;

@@ -1,0 +1,5 @@
+//! glTF files.
+
+mod damage;
+mod files;
+mod inputs;

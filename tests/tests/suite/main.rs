@@ -1,0 +1,17 @@
+//! What concerns several backends at once.
+
+mod accuracy;
+mod agreement;
+mod bad_vertices;
+mod economy;
+mod environment;
+mod forward;
+mod fuzz;
+mod geometry;
+mod half;
+mod inputs;
+mod lighting;
+mod operations;
+mod position;
+mod programs;
+mod shading;

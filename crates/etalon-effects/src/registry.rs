@@ -12,7 +12,17 @@ use crate::ssr::{Ssr, ssr};
 use crate::{EffectError, SceneInputs};
 
 /// Declares an effect with some knobs set and returns its result.
-type Declare = fn(&mut Graph, &SceneInputs, &[(&str, KnobValue)]) -> Result<Texture, EffectError>;
+type DeclareWith =
+    fn(&mut Graph, &SceneInputs, &[(&str, KnobValue)]) -> Result<Texture, EffectError>;
+
+/// Declares an effect as it is.
+pub type Declare = fn(&mut Graph, &SceneInputs) -> Result<Texture, EffectError>;
+
+#[derive(Clone, Copy, Debug)]
+enum How {
+    Tuned(DeclareWith),
+    Fixed(Declare),
+}
 
 /// An effect that can be built on any scene.
 #[derive(Clone, Copy, Debug)]
@@ -22,16 +32,27 @@ pub struct EffectEntry {
     /// What it does, in a sentence.
     pub description: &'static str,
     knobs: fn() -> Vec<KnobInfo>,
-    declare: Declare,
+    how: How,
 }
 
 impl EffectEntry {
-    const fn of<S: Tunable>(description: &'static str, declare: Declare) -> Self {
+    const fn of<S: Tunable>(description: &'static str, declare: DeclareWith) -> Self {
         Self {
             name: S::EFFECT,
             description,
             knobs: infos::<S>,
-            declare,
+            how: How::Tuned(declare),
+        }
+    }
+
+    /// An effect, or several as one, with settings of its own that are no knobs.
+    #[must_use]
+    pub const fn fixed(name: &'static str, description: &'static str, declare: Declare) -> Self {
+        Self {
+            name,
+            description,
+            knobs: Vec::new,
+            how: How::Fixed(declare),
         }
     }
 
@@ -60,7 +81,18 @@ impl EffectEntry {
         inputs: &SceneInputs,
         values: &[(&str, KnobValue)],
     ) -> Result<Texture, EffectError> {
-        (self.declare)(graph, inputs, values)
+        match self.how {
+            How::Tuned(declare) => declare(graph, inputs, values),
+            How::Fixed(declare) => match values.first() {
+                None => declare(graph, inputs),
+                Some((knob, _)) => Err(KnobError::Unknown {
+                    effect: self.name,
+                    knob: (*knob).to_owned(),
+                    known: Vec::new(),
+                }
+                .into()),
+            },
+        }
     }
 }
 
@@ -87,25 +119,12 @@ const EFFECTS: &[EffectEntry] = &[
         "Tone curve and encoding for the display",
         |graph, inputs, values| composite(graph, inputs.colour, None, None, &tuned(values)?),
     ),
-    EffectEntry {
-        name: CHAIN,
-        description: "Reflection, exposure, bloom and composite, one after the other",
-        knobs: Vec::new,
-        declare: |graph, inputs, values| {
-            if let Some((knob, _)) = values.first() {
-                return Err(KnobError::Unknown {
-                    effect: CHAIN,
-                    knob: (*knob).to_owned(),
-                    known: Vec::new(),
-                }
-                .into());
-            }
-            Ok(chain(graph, inputs, &ChainSettings::full())?.picture)
-        },
-    },
+    EffectEntry::fixed(
+        "chain",
+        "Reflection, exposure, bloom and composite, one after the other",
+        |graph, inputs| Ok(chain(graph, inputs, &ChainSettings::full())?.picture),
+    ),
 ];
-
-const CHAIN: &str = "chain";
 
 /// The effect of that name.
 #[must_use]

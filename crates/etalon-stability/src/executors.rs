@@ -107,12 +107,17 @@ impl FromStr for Kind {
     }
 }
 
-/// What is watched for beside numbers. Births of NaN and infinities are the sanitiser's.
+/// What is watched for beside numbers.
 const CHECKS: Checks = Checks {
     uninitialised: false,
     races: false,
-    non_finite: false,
     ..Checks::all()
+};
+
+/// The same where the sanitiser sees births of NaN and infinities.
+const CHECKS_BESIDE_SANITISER: Checks = Checks {
+    non_finite: false,
+    ..CHECKS
 };
 
 enum Backing {
@@ -147,7 +152,11 @@ impl Executor {
             .map(|backend| Backing::Interpreter(Box::new(backend)))
         };
         let backing = match kind {
-            Kind::Cpu => interpreter(NumberType::F32)?,
+            Kind::Cpu => CpuBackend::new(&CpuOptions {
+                checks: CHECKS,
+                ..CpuOptions::default()
+            })
+            .map(|backend| Backing::Interpreter(Box::new(backend)))?,
             Kind::Double => interpreter(NumberType::F64)?,
             Kind::Shadow => interpreter(NumberType::Shadow)?,
             Kind::Perturbed => CpuBackend::new(&CpuOptions {
@@ -157,7 +166,7 @@ impl Executor {
             .map(|backend| Backing::Interpreter(Box::new(backend)))?,
             Kind::Sanitiser => CpuBackend::new(&CpuOptions {
                 sanitise: true,
-                checks: CHECKS,
+                checks: CHECKS_BESIDE_SANITISER,
                 ..CpuOptions::default()
             })
             .map(|backend| Backing::Interpreter(Box::new(backend)))?,

@@ -3,8 +3,10 @@
 //! The cases come from the effects' own tables, so that a new knob has its own.
 
 use etalon_core::graph::Graph;
+use etalon_effects::composite::{Composite, Output, ToneCurve};
+use etalon_effects::exposure::Exposure;
 use etalon_effects::knob::{Domain, KnobInfo, KnobValue};
-use etalon_effects::{EffectEntry, EffectError, effects};
+use etalon_effects::{ChainSettings, EffectEntry, EffectError, chain, effects};
 use etalon_scenes::cases::{Case, Step};
 
 use crate::model::Refusal;
@@ -94,7 +96,7 @@ pub fn subjects(frames: &'static Case) -> Vec<Subject> {
                         knob.name, knob.domain, knob.description
                     ),
                     source: format!("the settings of etalon_effects::{}", effect.name),
-                    effects: vec![effect],
+                    effects: vec![*effect],
                     knobs,
                     expected: &[],
                     recovery: None,
@@ -104,6 +106,47 @@ pub fn subjects(frames: &'static Case) -> Vec<Subject> {
         }
     }
     found
+}
+
+/// Every factor on the light at its most, one after the other: the brightest light
+/// that the settings can ask for.
+#[must_use]
+pub fn extremes(frames: &'static Case) -> Subject {
+    Subject {
+        name: "knobs-brightest-together".to_owned(),
+        family: FAMILY,
+        reason:
+            "exposure of a dark scene by the largest key and compensation and the largest factor \
+                 make light of 10²³ of that of the sun, whose square f32 cannot hold"
+                .to_owned(),
+        source: "the settings of etalon_effects::exposure and etalon_effects::composite".to_owned(),
+        effects: vec![EffectEntry::fixed(
+            "chain",
+            "The chain at its brightest",
+            |graph, inputs| {
+                let exposure = Exposure {
+                    key: 10.0,
+                    compensation: 16.0,
+                    min_luminance: 1e-6,
+                    max_luminance: 1e-6,
+                    ..Exposure::default()
+                };
+                let settings = ChainSettings {
+                    exposure: Some(exposure),
+                    composite: Composite {
+                        exposure: 1e6,
+                        output: Output::Sdr(ToneCurve::Aces),
+                    },
+                    ..ChainSettings::full()
+                };
+                Ok(chain(graph, inputs, &settings)?.picture)
+            },
+        )],
+        knobs: Vec::new(),
+        expected: &[],
+        recovery: None,
+        frames,
+    }
 }
 
 /// A knob's value, and where another knob has to be no less than it, that one as

@@ -7,10 +7,12 @@
 //! * are all numbers finite?
 //! * are wgpu's and Vulkan's bits the interpreter's, under strict arithmetic?
 //! * how far is `f32` from the `f64` that takes the same decisions?
+//! * is it what the effect's truth says, where it has one?
 //! * and at which operation of which kernel did it lose its digits, or decide what
 //!   `f64` would not?
 //!
 //! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
+//! * [`functions`]: the kernels' library by itself;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
 //! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
@@ -39,6 +41,7 @@
 #![forbid(unsafe_code)]
 
 pub mod executors;
+pub mod functions;
 pub mod judge;
 pub mod kernels;
 pub mod knobs;

@@ -49,7 +49,7 @@ struct Arguments {
     #[arg(long)]
     kernels: Option<PathBuf>,
     /// Take the guards of kernels away, one at a time, and see whether anything is found:
-    /// takes some five minutes on frames of up to 600 texels, unless `--largest` says
+    /// takes MUTATE_MINUTES minutes on frames of up to 2048 texels, unless `--largest` says
     /// otherwise.
     #[arg(long)]
     mutate: bool,
@@ -76,7 +76,7 @@ impl Arguments {
     fn run(self) -> Result<bool, String> {
         if self.mutate {
             let shown = ProgressBar::no_length();
-            let mutants = mutate::mutate(self.largest.unwrap_or(600), |done, of| {
+            let mutants = mutate::mutate(self.largest.unwrap_or(FOLLOWED), |done, of| {
                 shown.set_length(of as u64);
                 shown.set_position(done as u64);
             });

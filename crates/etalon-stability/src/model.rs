@@ -8,6 +8,7 @@ use crate::judge::agreement::Difference;
 use crate::judge::finite::NonFinite;
 use crate::judge::rounding::Rounding;
 use crate::judge::spread::{Outside, Width};
+use crate::judge::truth::Untrue;
 use crate::sanitise;
 
 /// Everything that a run found.
@@ -174,6 +175,8 @@ pub struct ExecutorResult {
     pub digest: Option<u64>,
     /// What is no number.
     pub non_finite: Option<NonFinite>,
+    /// What is not as the effect's truth says; of the interpreter.
+    pub untrue: Option<Untrue>,
     /// Where it is not the interpreter's bits; of devices.
     pub difference: Option<Difference>,
     /// How far `f32` is from `f64`; of the shadow.
@@ -192,6 +195,8 @@ pub struct ExecutorResult {
 pub enum FindingKind {
     /// An infinity or NaN was stored.
     NonFinite,
+    /// The effect's truth, computed in `f64` from its definition, says otherwise.
+    Untrue,
     /// A device's bits are not the interpreter's.
     Disagreement,
     /// `f32` is too far from `f64`.

@@ -10,11 +10,14 @@
 //! Each such line is replaced by that, one at a time, and the corpus run again. A guard
 //! that nothing is found without is one that no case needs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use etalon_effects::effect;
 use serde::{Deserialize, Serialize};
 
 use crate::executors::Kind;
+use crate::functions::LIBRARY;
+use crate::model::Report;
 use crate::run::{Options, RunError, run};
 
 /// What begins such a comment.
@@ -81,8 +84,16 @@ pub fn without(text: &str, guard: &Guard) -> String {
     mutated
 }
 
+/// Most cases that are followed by the sanitiser and the shadow, of a guard without
+/// which nothing is found before.
+const FOLLOWED: usize = 16;
+
 /// Removes each guard of the embedded kernels in turn and runs the corpus, of frames of
 /// up to so many texels. `progress` is told how many are done, of how many.
+///
+/// The interpreter alone sees what is no number, what its checks watch for, and what is
+/// not the effects' truth. Where it sees nothing, cases that store other bits are run
+/// again with the sanitiser and beside `f64`.
 ///
 /// # Errors
 /// Those of [`run`](fn@run).
@@ -91,51 +102,102 @@ pub fn mutate(
     mut progress: impl FnMut(usize, usize),
 ) -> Result<Vec<Mutant>, RunError> {
     let mut options = Options {
-        executors: vec![Kind::Cpu, Kind::Sanitiser],
+        executors: vec![Kind::Cpu],
         largest: Some(largest),
         followed: largest,
         ..Options::default()
     };
-    let digests = |options: &Options| {
-        run(options, &mut ()).map(|report| {
-            let digests: BTreeMap<_, _> = report
-                .cases
-                .iter()
-                .filter_map(|case| {
-                    let digest = case.results.first()?.digest?;
-                    Some(((case.name.clone(), case.effect.clone()), digest))
-                })
-                .collect();
-            (report, digests)
-        })
-    };
-    let (_, guarded) = digests(&options)?;
+    let guarded = digests(&run(&options, &mut ())?);
     let all = guards(etalon_shaders::sources());
     let mut mutants = Vec::with_capacity(all.len());
     for (index, guard) in all.iter().enumerate() {
         progress(index, all.len());
         let text = etalon_shaders::source(&guard.path).unwrap_or_default();
         options.kernels = vec![(guard.path.clone(), without(text, guard))];
-        let (report, unguarded) = digests(&options)?;
-        let finding = report
-            .findings()
-            .next()
-            .map(|(case, finding)| format!("{} on {}: {}", case.effect, case.name, finding.text));
+        options.effects = users(&guard.path, etalon_shaders::sources());
+        let mut report = run(&options, &mut ())?;
+        if report.is_sound() {
+            // What is brightest comes of all effects together.
+            options.effects = vec![CHAIN.to_owned()];
+            let chain = run(&options, &mut ())?;
+            report.cases.extend(chain.cases);
+        }
+        let unguarded = digests(&report);
+        let changed: Vec<&(String, String)> = unguarded
+            .iter()
+            .filter(|(case, digest)| guarded.get(*case) != Some(digest))
+            .map(|(case, _)| case)
+            .collect();
+        if report.is_sound() && !changed.is_empty() {
+            let cases = changed.iter().take(FOLLOWED);
+            let (cases, effects): (Vec<_>, Vec<_>) = cases.map(|case| (*case).clone()).unzip();
+            report = run(
+                &Options {
+                    cases,
+                    effects: effects
+                        .into_iter()
+                        .collect::<BTreeSet<_>>()
+                        .into_iter()
+                        .collect(),
+                    executors: vec![Kind::Cpu, Kind::Double, Kind::Shadow, Kind::Sanitiser],
+                    ..options.clone()
+                },
+                &mut (),
+            )?;
+        }
+        let first = report.findings().next();
         mutants.push(Mutant {
             guard: guard.clone(),
-            finding,
+            finding: first.map(|(case, finding)| {
+                format!("{} on {}: {}", case.effect, case.name, finding.text)
+            }),
             failed: report
                 .cases
                 .iter()
                 .filter(|case| !case.findings.is_empty())
                 .count(),
-            changed: guarded
-                .iter()
-                .filter(|(case, digest)| unguarded.get(*case) != Some(digest))
-                .count(),
+            changed: changed.len(),
         });
     }
     Ok(mutants)
+}
+
+/// All effects in one, of the registry.
+const CHAIN: &str = "chain";
+
+/// The effects whose kernels a file is or that import it, directly or not, of files by
+/// their paths; and the library's functions, if it is of these.
+fn users<'a>(path: &str, files: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<String> {
+    let files: Vec<(&str, &str)> = files.into_iter().collect();
+    let mut found = BTreeSet::from([path]);
+    loop {
+        let before = found.len();
+        for (user, text) in &files {
+            let imports = |path: &&str| {
+                let import = format!("import package::{}::", path.replace('/', "::"));
+                text.contains(&import)
+            };
+            if found.iter().any(imports) {
+                found.insert(user);
+            }
+        }
+        if found.len() == before {
+            break;
+        }
+    }
+    let folders = found.iter().filter_map(|path| path.split('/').next());
+    let known = |folder: &&str| *folder == LIBRARY || effect(folder).is_some();
+    let folders: BTreeSet<&str> = folders.filter(known).collect();
+    folders.into_iter().map(str::to_owned).collect()
+}
+
+/// What the interpreter stored in each case with each effect, as a number.
+fn digests(report: &Report) -> BTreeMap<(String, String), u64> {
+    let each = report.cases.iter().filter_map(|case| {
+        let digest = case.results.first()?.digest?;
+        Some(((case.name.clone(), case.effect.clone()), digest))
+    });
+    each.collect()
 }
 
 /// A line for each, what nothing was found without first.
@@ -190,6 +252,20 @@ mod tests {
         let mutated = without(TEXT, guard);
         assert!(mutated.contains("\nlet y = x;\n") && !mutated.contains("max"));
         assert_eq!(mutated.lines().count(), TEXT.lines().count());
+    }
+
+    #[test]
+    fn a_file_is_used_by_whoever_imports_it_in_the_end() {
+        let files = [
+            ("lib/a", "fn a() {}"),
+            ("lib/b", "import package::lib::a::a;"),
+            ("ssr/march", "import package::lib::b::{b, c};"),
+            ("bloom/blur", "import package::lib::c::c;"),
+        ];
+        assert_eq!(users("lib/a", files), ["lib", "ssr"]);
+        assert_eq!(users("ssr/march", files), ["ssr"]);
+        let real = users("lib/camera", etalon_shaders::sources());
+        assert_eq!(real, ["lib", "ssr"]);
     }
 
     #[test]

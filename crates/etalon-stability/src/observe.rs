@@ -16,7 +16,7 @@ pub enum ObserveError {
 }
 
 /// What one pass wrote to one binding.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Store {
     /// The pass, or `output` for what the graph gives.
     pub pass: String,

@@ -20,7 +20,7 @@ pub struct Subject {
     /// Where that is known from.
     pub source: String,
     /// The effects that are run on it.
-    pub effects: Vec<&'static EffectEntry>,
+    pub effects: Vec<EffectEntry>,
     /// Knobs that are set.
     pub knobs: Vec<(&'static str, KnobValue)>,
     /// Larger rounding errors, with their reasons.
@@ -58,6 +58,7 @@ impl Subject {
             effects: effects()
                 .iter()
                 .filter(|effect| case.concerns(effect.name))
+                .copied()
                 .collect(),
             knobs: case.knobs.to_vec(),
             expected: case.expected,
@@ -101,5 +102,6 @@ pub fn subjects() -> Result<Vec<Subject>, SubjectError> {
         .collect();
     let frames = case(knobs::FRAMES).ok_or(SubjectError::Missing(knobs::FRAMES))?;
     found.extend(knobs::subjects(frames));
+    found.push(knobs::extremes(frames));
     Ok(found)
 }

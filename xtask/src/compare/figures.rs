@@ -180,6 +180,10 @@ pub fn compare(reference: &ImageData, subject: &ImageData) -> Result<Comparison,
 /// One channel of one texel in which two images differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
+    /// The texel's number, in storage order.
+    pub texel: usize,
+    /// The channel.
+    pub channel: usize,
     /// The distance, above 0.
     pub ulps: Ulps,
     /// The reference's decoded value.
@@ -211,8 +215,10 @@ pub fn texels_with(
 ) -> Result<u64, CompareError> {
     check(reference, subject)?;
     let format = reference.desc.format;
-    let mut count = 0;
+    let (mut count, mut next) = (0, 0);
     for_each_texel(reference, subject, |_, bytes_reference, bytes_subject| {
+        let texel = next;
+        next += 1;
         if bytes_reference == bytes_subject {
             return;
         }
@@ -225,6 +231,8 @@ pub fn texels_with(
         let holds = |channel: usize| {
             let ulps = Ulps(distances[channel]);
             let difference = Difference {
+                texel,
+                channel,
                 ulps,
                 reference: values.0[channel],
                 subject: values.1[channel],

@@ -1,6 +1,7 @@
 //! Tolerances as data, and verdicts.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use etalon_core::image::ImageData;
 use serde::Serialize;
@@ -17,6 +18,15 @@ pub enum Tolerance {
     /// values (which WGSL lets devices flush) and the payloads of NaNs are not
     /// looked at.
     BitEqual,
+    /// Each texel as far as perturbed executions move it.
+    Spread {
+        /// For each channel of each texel, in storage order, in the unit of the decoded
+        /// values.
+        #[serde(skip)]
+        allowed: Arc<[[f32; 4]]>,
+        /// Texels that may lie beyond: as many as were decided otherwise.
+        decided: u64,
+    },
     /// Within a limit derived from how the values are computed.
     Within {
         /// For every channel of the texels that are not outliers.
@@ -72,7 +82,7 @@ impl Tolerance {
     #[must_use]
     pub fn with_outliers(self, share: f64) -> Self {
         match self {
-            Self::BitEqual => Self::BitEqual,
+            Self::BitEqual | Self::Spread { .. } => self,
             Self::Within { limit, reason, .. } => Self::Within {
                 limit,
                 outliers: share,
@@ -86,6 +96,8 @@ impl Tolerance {
     pub fn summary(&self) -> String {
         match self {
             Self::BitEqual => "bit equal".to_owned(),
+            Self::Spread { decided: 0, .. } => "≤ spread".to_owned(),
+            Self::Spread { decided, .. } => format!("≤ spread but for {decided}"),
             Self::Within {
                 limit, outliers, ..
             } => {
@@ -113,6 +125,10 @@ impl Tolerance {
                 "strict arithmetic allows one result only: operations are correctly rounded, in one order, \
                  without contraction, and stores round explicitly"
             }
+            Self::Spread { .. } => {
+                "four times what the largest of eight executions moved it that rounded, fused and flushed as WGSL \
+                 allows, and a unit for the store; texels are left out where these decided otherwise"
+            }
             Self::Within { reason, .. } => reason,
         }
     }
@@ -127,16 +143,24 @@ impl Tolerance {
         reference: &ImageData,
         subject: &ImageData,
     ) -> Result<Verdict, CompareError> {
+        // Written so that a limit of NaN tolerates nothing.
         let (limit, outliers) = match self {
-            Self::BitEqual => (Limit::Ulps(0), 0.0),
+            Self::BitEqual => (Limit::Ulps(0), 0),
+            Self::Spread { decided, .. } => (Limit::Absolute(0.0), *decided),
             Self::Within {
                 limit, outliers, ..
-            } => (*limit, *outliers),
+            } => (*limit, (outliers * comparison.texels as f64) as u64),
         };
-        // Written so that a limit of NaN tolerates nothing.
+        let own = |difference: &Difference| match self {
+            Self::Spread { allowed, .. } => {
+                let texel = allowed.get(difference.texel).copied().unwrap_or_default();
+                Limit::Absolute(texel[difference.channel].into())
+            }
+            _ => limit,
+        };
         let within = |difference: &Difference| {
             difference.ulps != Ulps::INFINITE
-                && match limit {
+                && match own(difference) {
                     Limit::Ulps(max) => difference.ulps <= Ulps(max),
                     Limit::Absolute(max) => difference.absolute() <= max,
                     Limit::Relative { relative, absolute } => {
@@ -154,7 +178,7 @@ impl Tolerance {
         }
         let beyond = texels_with(reference, subject, |difference| !within(difference))?;
         let share = beyond as f64 / comparison.texels.max(1) as f64;
-        if share <= outliers {
+        if beyond <= outliers {
             return Ok(Verdict::Pass);
         }
         Ok(Verdict::Fail(format!(

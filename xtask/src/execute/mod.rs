@@ -7,6 +7,7 @@ mod buffer;
 pub mod frame;
 pub mod outcome;
 pub mod plant;
+mod spread;
 
 use std::path::{Path, PathBuf};
 
@@ -98,6 +99,9 @@ pub struct Job {
     /// Whether the interpreter watches for what a GPU hides.
     #[arg(long)]
     pub checks: bool,
+    /// Whether the interpreter finds out how far devices may be from what it stores.
+    #[arg(long)]
+    pub spread: bool,
     /// A fault to plant.
     #[arg(long)]
     pub plant: Option<Fault>,
@@ -149,6 +153,9 @@ impl Job {
         }
         if self.checks {
             arguments.push("--checks".into());
+        }
+        if self.spread {
+            arguments.push("--spread".into());
         }
         arguments
     }
@@ -314,5 +321,8 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
         }
     }
     run.findings = opened.findings();
+    if job.spread {
+        spread::add(job, &plan, &content, &mut run)?;
+    }
     Ok(run)
 }

@@ -101,6 +101,26 @@ pub struct Capture {
     pub buffer: bool,
     /// The file with its bytes, in the folder of the outcome.
     file: String,
+    /// How far devices may be from it.
+    #[serde(default)]
+    spread: Option<SpreadFile>,
+}
+
+/// Where it is written how far devices may be from a capture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct SpreadFile {
+    /// `rgba32float` of the capture's size, in the folder of the outcome.
+    file: String,
+    decided: u64,
+}
+
+/// How far devices may be from a capture, by executions that were perturbed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spread {
+    /// For each channel of each texel, in storage order.
+    pub allowed: Vec<[f32; 4]>,
+    /// Texels that may be anything, since a decision hangs on a rounding.
+    pub decided: u64,
 }
 
 impl Capture {
@@ -131,7 +151,53 @@ impl Capture {
             desc: image.desc,
             buffer: label.buffer,
             file,
+            spread: None,
         })
+    }
+
+    /// Writes how far devices may be from it.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn write_spread(&mut self, folder: &Path, spread: &Spread) -> Result<(), OutcomeError> {
+        let file = format!("{}.spread", self.file);
+        let path = folder.join(&file);
+        let bytes: Vec<u8> = spread
+            .allowed
+            .iter()
+            .flatten()
+            .flat_map(|value| value.to_le_bytes())
+            .collect();
+        std::fs::write(&path, bytes).map_err(|source| OutcomeError::Io { path, source })?;
+        self.spread = Some(SpreadFile {
+            file,
+            decided: spread.decided,
+        });
+        Ok(())
+    }
+
+    /// Reads how far devices may be from it, if that was written.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn read_spread(&self, folder: &Path) -> Result<Option<Spread>, OutcomeError> {
+        let Some(written) = &self.spread else {
+            return Ok(None);
+        };
+        let path = folder.join(&written.file);
+        let bytes = std::fs::read(&path).map_err(|source| OutcomeError::Io { path, source })?;
+        let (texels, _) = bytes.as_chunks::<16>();
+        let channel = |texel: &[u8; 16], channel: usize| {
+            let (channels, _) = texel.as_chunks::<4>();
+            f32::from_le_bytes(channels[channel])
+        };
+        Ok(Some(Spread {
+            allowed: texels
+                .iter()
+                .map(|texel| [0, 1, 2, 3].map(|number| channel(texel, number)))
+                .collect(),
+            decided: written.decided,
+        }))
     }
 
     /// Reads the image back.
@@ -276,6 +342,22 @@ mod tests {
             outcome.write(folder.path()).unwrap();
             assert_eq!(Outcome::read(folder.path()).unwrap(), outcome);
         }
+    }
+
+    #[test]
+    fn a_spread_is_read_as_it_was_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut run, _) = run(folder.path());
+        assert_eq!(run.captures[0].read_spread(folder.path()).unwrap(), None);
+        let spread = Spread {
+            allowed: vec![[0.5, 0.0, 1e-7, f32::INFINITY]; 6],
+            decided: 3,
+        };
+        run.captures[0]
+            .write_spread(folder.path(), &spread)
+            .unwrap();
+        let read = run.captures[0].read_spread(folder.path()).unwrap();
+        assert_eq!(read, Some(spread));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use thiserror::Error;
 use super::gallery::{Gallery, GalleryError};
 use super::model::{BackendKind, Case, ComparisonReport, Executor, Report, Status};
 use crate::compare::{CompareError, Tolerance, Verdict, compare, describe};
-use crate::execute::outcome::{Capture, OutcomeError, Run};
+use crate::execute::outcome::{Capture, OutcomeError, Run, Spread};
 use crate::setup;
 
 /// An execution to compare: who, and what is in which folder.
@@ -74,7 +74,7 @@ pub(super) fn pairs<'a>(finished: &[Finished<'a>]) -> Vec<(Finished<'a>, Finishe
 pub(super) fn compare_pair(
     case: &Case,
     (reference, subject): (Finished<'_>, Finished<'_>),
-    tolerance: impl Fn(&Capture) -> Tolerance,
+    tolerance: impl Fn(&Capture, Option<Spread>) -> Tolerance,
     mut gallery: Option<&mut Gallery>,
 ) -> Result<Vec<ComparisonReport>, EvaluateError> {
     let mut others: BTreeMap<_, _> = subject
@@ -106,7 +106,7 @@ pub(super) fn compare_pair(
     };
     let mut reports = Vec::new();
     for capture in &reference.run.captures {
-        let tolerance = tolerance(capture);
+        let tolerance = tolerance(capture, capture.read_spread(reference.folder)?);
         let Some(other) = others.remove(&capture.key()) else {
             let why = format!("{} did not capture it", subject.executor.id);
             reports.push(report(capture, tolerance, Verdict::Fail(why)));
@@ -130,7 +130,11 @@ pub(super) fn compare_pair(
     }
     for capture in others.into_values() {
         let why = format!("{} did not capture it", reference.executor.id);
-        reports.push(report(capture, tolerance(capture), Verdict::Fail(why)));
+        reports.push(report(
+            capture,
+            tolerance(capture, None),
+            Verdict::Fail(why),
+        ));
     }
     Ok(reports)
 }

@@ -141,6 +141,10 @@ impl Options {
             threads: self.threads,
             validate: self.validate,
             checks: self.checks,
+            // What is drawn is not perturbed.
+            spread: executor.backend == BackendKind::Cpu
+                && arithmetic == ArithmeticName::Fast
+                && !source.is_drawn(),
             plant: planted.map(|(_, fault)| fault.clone()),
             out,
         }

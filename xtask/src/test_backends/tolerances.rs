@@ -5,8 +5,10 @@
 //! executor on it is held to the tolerance of fast arithmetic.
 //!
 //! *Fast arithmetic* on ash and on wgpu hands one driver the same SPIR-V, so
-//! between these two nothing is tolerated either. Against the interpreter the
-//! tolerance follows from where roundings are free:
+//! between these two nothing is tolerated either. Against the interpreter each texel
+//! may be as far off as perturbed executions of the interpreter move it
+//! ([`etalon_stability::judge::spread`]). What is drawn is not perturbed, and neither is
+//! OpenGL's strict arithmetic; there the tolerance follows from where roundings are free:
 //!
 //! * A store to a 16-bit float may truncate or round to nearest: one unit of
 //!   the last place, at most u = 2⁻¹⁰ of the value. Built-in functions and
@@ -42,7 +44,7 @@ use etalon_core::Format;
 use super::evaluate::Finished;
 use super::model::{BackendKind, Case, Target};
 use crate::compare::{Limit, Tolerance};
-use crate::execute::outcome::Capture;
+use crate::execute::outcome::{Capture, Spread};
 
 /// The unit of the last place of a 16-bit float, relative to the value.
 const UNIT: f64 = 1.0 / 1024.0;
@@ -76,7 +78,7 @@ pub(super) fn of(
     case: &Case,
     drawn: bool,
     (reference, subject): (Finished<'_>, Finished<'_>),
-) -> impl Fn(&Capture) -> Tolerance {
+) -> impl Fn(&Capture, Option<Spread>) -> Tolerance {
     let exact = match subject.executor.target {
         Target::Gl => false,
         _ => case.arithmetic == "strict" || reference.executor.backend == BackendKind::Wgpu,
@@ -100,10 +102,16 @@ pub(super) fn of(
         }
         largest = largest.max(texels(capture));
     }
-    move |capture| {
+    move |capture, spread| {
         let depth = capture.desc.format == Format::Depth32Float;
         if exact && (raster == Raster::None || raster == Raster::Same && depth) {
             return Tolerance::BitEqual;
+        }
+        if let Some(spread) = spread {
+            return Tolerance::Spread {
+                allowed: spread.allowed.into(),
+                decided: spread.decided,
+            };
         }
         let before = passes
             .iter()

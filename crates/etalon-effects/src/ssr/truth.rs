@@ -30,6 +30,8 @@
 //! before it again at the cell's middle, where the effect looks. That is the
 //! truth about the screen; what the scene would say is another question.
 
+pub mod claim;
+
 use glam::{DVec2, DVec3, DVec4, Vec4Swizzles as _};
 
 use super::{Blend, Ssr};
@@ -157,6 +159,13 @@ struct Ray {
     slope: f64,
     /// Where the ray is cut.
     end: f64,
+}
+
+impl Ray {
+    /// From the view plane, at a place.
+    fn distance(&self, place: f64) -> f64 {
+        1.0 / (self.inverse + self.slope * place)
+    }
 }
 
 /// A cell passed for less than this, in texels, is touched at a corner, which
@@ -307,7 +316,7 @@ impl<'a> Search<'a> {
     fn hit(&self, ray: &Ray, cell: Cell, place: f64) -> TrueHit {
         let thickness = f64::from(self.settings.thickness);
         let pixel = ray.origin + ray.step * place;
-        let distance = 1.0 / (ray.inverse + ray.slope * place);
+        let distance = ray.distance(place);
         let residue = (distance - 1.0 / cell.front).clamp(0.0, thickness);
         let length = self.view.position(pixel, distance).distance(ray.start);
         let uv = pixel / self.view.size;

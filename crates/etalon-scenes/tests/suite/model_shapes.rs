@@ -1,7 +1,5 @@
 //! Procedural meshes against what is known of the shapes.
 
-use crate::common;
-
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 

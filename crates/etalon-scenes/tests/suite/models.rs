@@ -1,7 +1,5 @@
 //! Models: what is refused, and what a snapshot says.
 
-use crate::common;
-
 use etalon_scenes::model::{
     Animation, DrawClass, Image, Instance, Interpolation, Light, LightKind, Material, Mesh, Model,
     ModelError, ModelParts, Moment, Node, Skin, TextureUse, Track, Transform, Values, Vertices,

@@ -7,3 +7,4 @@ mod reflection;
 pub mod rounding;
 pub mod scale;
 pub mod spread;
+pub mod truth;

@@ -66,6 +66,17 @@ pub struct Spread {
     stores: Vec<Moves>,
 }
 
+/// What a device may store.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Allowed<'a> {
+    /// Around this.
+    pub store: &'a Store,
+    /// How far from it, for each channel of each texel.
+    pub channels: Vec<[f64; 4]>,
+    /// Texels that may be anything, since a sample decided otherwise in as many.
+    pub decided: u64,
+}
+
 #[derive(Clone, Debug, PartialEq)]
 struct Moves {
     store: Store,
@@ -132,11 +143,25 @@ impl Spread {
         width
     }
 
+    /// How far texels may be from the centre, for each store of numbers.
+    pub fn allowed(&self) -> impl Iterator<Item = Allowed<'_>> {
+        self.stores
+            .iter()
+            .enumerate()
+            .map(|(number, moves)| Allowed {
+                store: &moves.store,
+                channels: (0..moves.moved.len())
+                    .map(|index| [0, 1, 2, 3].map(|channel| moves.allowed(number, index, channel)))
+                    .collect(),
+                decided: moves.decided(),
+            })
+    }
+
     /// Compares a device's frame, and adds the worst pass that is outside to `found`.
     pub fn compare(&self, frame: usize, stores: &[Store], found: &mut Option<Outside>) {
         for (number, moves) in self.stores.iter().enumerate() {
             let same = stores.iter().find(|store| store.same_as(&moves.store));
-            let Some((image, texels)) = same.and_then(texels) else {
+            let Some((_, texels)) = same.and_then(texels) else {
                 continue;
             };
             let mut outside = Outside {
@@ -146,12 +171,7 @@ impl Spread {
             for (index, (texel, centre)) in texels.iter().zip(&moves.centre).enumerate() {
                 let beyond = (0..4).find_map(|channel| {
                     let (value, centre) = (f64::from(texel[channel]), f64::from(centre[channel]));
-                    let unit = 2.0 * half_step(image.desc.format, channel, centre.abs());
-                    let stores = match image.desc.format.encoding() {
-                        Encoding::Ufloat => (number + 1) as f64,
-                        _ => 1.0,
-                    };
-                    let allowed = FACTOR * moves.moved[index][channel] + stores * unit;
+                    let allowed = moves.allowed(number, index, channel);
                     // Written so that a NaN is outside.
                     let within = (value - centre).abs() <= allowed;
                     (!within).then_some((channel, value, centre, allowed))
@@ -178,6 +198,20 @@ impl Spread {
 }
 
 impl Moves {
+    /// How far a channel may be from its centre; the store is the `number`-th, from 0.
+    fn allowed(&self, number: usize, index: usize, channel: usize) -> f64 {
+        let Some(format) = self.store.image.as_ref().map(|image| image.desc.format) else {
+            return 0.0;
+        };
+        let centre = f64::from(self.centre[index][channel]);
+        let unit = 2.0 * half_step(format, channel, centre.abs());
+        let stores = match format.encoding() {
+            Encoding::Ufloat => (number + 1) as f64,
+            _ => 1.0,
+        };
+        FACTOR * self.moved[index][channel] + stores * unit
+    }
+
     fn each(&self) -> impl Iterator<Item = (f64, f32)> {
         let pairs = self.moved.iter().zip(&self.centre);
         pairs.flat_map(|(moved, centre)| moved.iter().copied().zip(centre.iter().copied()))

@@ -1,12 +1,13 @@
 //! What is made of what the sanitiser found in one case.
 
-use etalon_cpu::StepSanitised;
 use etalon_cpu::sanitise::Fault;
+use etalon_cpu::{Finding, FindingKind as CheckKind, StepFinding, StepSanitised};
 use serde::{Deserialize, Serialize};
 
 use super::allow::{AllowError, Allowances};
 use super::effect::{Effect, effect};
 use super::finding::{Findings, Found};
+use crate::executors::Kind;
 use crate::model::{Finding as CaseFinding, FindingKind};
 use crate::observe::Store;
 
@@ -100,6 +101,23 @@ impl Watch {
         }
         self.findings.add(case, steps, &mut self.allowances);
         found
+    }
+
+    /// What the interpreter's checks found, but for births that a comment allows.
+    pub fn checked(&mut self, kind: Kind, found: Vec<StepFinding>) -> Vec<CaseFinding> {
+        found
+            .into_iter()
+            .filter(|found| {
+                let Finding { kind, location, .. } = &found.finding;
+                *kind != CheckKind::NonFinite
+                    || self.allowances.reason(location, Fault::Birth).is_none()
+            })
+            .map(|found| CaseFinding {
+                kind: FindingKind::Check,
+                executor: kind.to_string(),
+                text: found.to_string(),
+            })
+            .collect()
     }
 
     /// Everything found, sorted, and what is allowed but was not found.

@@ -164,7 +164,7 @@ fn report_with(
     let comparisons = pairs(&finished)
         .into_iter()
         .flat_map(|pair| {
-            compare_pair(&case(), pair, |_| Tolerance::BitEqual, gallery.as_mut()).unwrap()
+            compare_pair(&case(), pair, |_, _| Tolerance::BitEqual, gallery.as_mut()).unwrap()
         })
         .collect();
     let runs = executors

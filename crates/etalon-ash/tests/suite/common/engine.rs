@@ -28,10 +28,9 @@ unsafe extern "system" fn receive(
     vk::FALSE
 }
 
-/// An image and its memory.
+/// An image, whose memory goes with the device.
 pub(crate) struct EngineImage {
     pub(crate) image: vk::Image,
-    pub(crate) memory: vk::DeviceMemory,
     pub(crate) desc: TextureDesc,
     pub(crate) usage: vk::ImageUsageFlags,
 }
@@ -273,12 +272,7 @@ impl Engine {
         // SAFETY: the memory was made for it.
         unsafe { self.device.bind_image_memory(image, memory, 0) }.unwrap();
         self.images.lock().unwrap().push((image, memory));
-        EngineImage {
-            image,
-            memory,
-            desc,
-            usage,
-        }
+        EngineImage { image, desc, usage }
     }
 
     /// A buffer for copies, storage and draws that the host sees.

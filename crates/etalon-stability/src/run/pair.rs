@@ -1,4 +1,4 @@
-//! Running everything.
+//! One case with one effect, on every executor in turn.
 
 use std::collections::BTreeMap;
 
@@ -10,103 +10,19 @@ use etalon_core::resource::Limits;
 use etalon_cpu::StepSanitised;
 use etalon_effects::knob::KnobValue;
 use etalon_effects::ssr::Ssr;
-use etalon_effects::{EffectEntry, EffectError, effect, effects};
-use etalon_scenes::cases::{Step, case};
+use etalon_effects::{EffectEntry, EffectError};
+use etalon_scenes::cases::Step;
 use thiserror::Error;
 
+use super::conclude::conclusions;
 use crate::executors::{Executor, Kind};
 use crate::judge::spread::{PERTURBATIONS, Spread};
-use crate::judge::{agreement, finite, recovery, rounding};
-use crate::knobs;
-use crate::model::{
-    CaseReport, ExecutorInfo, ExecutorResult, ExpectedError, Finding, FindingKind, Report, Status,
-    Totals,
-};
+use crate::judge::{agreement, finite, recovery, rounding, truth};
+use crate::model::{CaseReport, ExecutorResult, ExpectedError, Finding, FindingKind, Status};
 use crate::observe::{ObserveError, Store};
 use crate::plant::Plant;
-use crate::sanitise::{AllowError, Counts, Watch};
-use crate::subject::{Subject, SubjectError, subjects};
-
-/// Default of [`Options::followed`].
-pub const FOLLOWED: usize = 2048;
-
-/// What is run.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Parts of the names of cases; all without one.
-    pub cases: Vec<String>,
-    /// Names of effects; all without one.
-    pub effects: Vec<String>,
-    /// Who runs them. Devices are compared with [`Kind::Cpu`], and [`Kind::Double`]
-    /// with [`Kind::Shadow`], where those are among them.
-    pub executors: Vec<Kind>,
-    /// Most texels of a case's frame; larger cases are left out. All are run
-    /// without it.
-    pub largest: Option<usize>,
-    /// Kernels in place of those built in: see [`kernels`](crate::kernels).
-    pub kernels: Vec<(String, String)>,
-    /// Most texels of a frame that the sanitiser and perturbed executions are run on:
-    /// they take far longer than the others.
-    pub followed: usize,
-    /// A fault to be found.
-    pub plant: Option<Plant>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            cases: Vec::new(),
-            effects: Vec::new(),
-            executors: Kind::ALL.to_vec(),
-            largest: None,
-            followed: FOLLOWED,
-            kernels: Vec::new(),
-            plant: None,
-        }
-    }
-}
-
-/// Who is told how far it got.
-pub trait Progress {
-    /// So many cases with an effect are to come.
-    fn begin(&mut self, _pairs: usize) {}
-    /// One is next.
-    fn next(&mut self, _case: &str, _effect: &str) {}
-}
-
-impl Progress for () {}
-
-/// Why there is no report.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum RunError {
-    /// No effect of that name.
-    #[error("there is no effect `{name}`; there are {}", effects().iter().map(|effect| effect.name).collect::<Vec<_>>().join(", "))]
-    NoEffect {
-        /// As given.
-        name: String,
-    },
-    /// No case with that in its name.
-    #[error("no case has `{name}` in its name")]
-    NoCase {
-        /// As given.
-        name: String,
-    },
-    /// A case has no frames.
-    #[error(transparent)]
-    Subject(#[from] SubjectError),
-    /// A comment in a kernel that is for the sanitiser cannot be understood.
-    #[error(transparent)]
-    Allow(#[from] AllowError),
-    /// An executor that `ETALON_REQUIRE` names is not there.
-    #[error("{name} is required: {source}")]
-    Required {
-        /// The executor.
-        name: &'static str,
-        /// Why it is not there.
-        source: BackendError,
-    },
-}
+use crate::sanitise::{Counts, Watch};
+use crate::subject::Subject;
 
 /// Why an executor has nothing to show.
 #[derive(Debug, Error)]
@@ -134,148 +50,15 @@ impl ExecuteError {
     }
 }
 
-/// Runs the cases on the effects and executors asked for.
-///
-/// # Errors
-/// If there is no such case or effect, a case cannot be made, or a backend that the
-/// variable `ETALON_REQUIRE` lists is not there; what goes wrong in an execution is
-/// in the report.
-pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, RunError> {
-    let chosen = choose(options)?;
-    let mut report = Report::default();
-    let mut executors = open(&options.executors, &mut report)?;
-    let mut watch = Watch::new()?;
-    let mut kernels = KernelLibrary::new();
-    for (path, text) in &options.kernels {
-        kernels.add_source(path, text);
-    }
-    progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
-    let mut named = std::collections::BTreeSet::new();
-    for (subject, effects) in &chosen {
-        let steps = subject.steps()?;
-        let pixels = steps.first().map_or(0, |step| step.frame.size().pixels());
-        if options.largest.is_some_and(|largest| pixels > largest) {
-            continue;
-        }
-        for &effect in effects {
-            progress.next(&subject.name, effect.name);
-            named.insert(&subject.name);
-            let pair = Pair {
-                subject,
-                effect,
-                steps: &steps,
-                kernels: &kernels,
-                plant: options.plant,
-                followed: pixels <= options.followed,
-            };
-            report.cases.push(pair.run(&mut executors, &mut watch));
-        }
-    }
-    // Values that are not allowed cost no execution: they are tried whenever no
-    // particular case was asked for.
-    if options.cases.is_empty()
-        && let Some(frames) = case(knobs::FRAMES)
-    {
-        let wanted =
-            |effect: &String| options.effects.is_empty() || options.effects.contains(effect);
-        report.refusals = knobs::refusals(frames);
-        report.refusals.retain(|refusal| wanted(&refusal.effect));
-    }
-    let (found, unused) = watch.finish();
-    for found in found {
-        report.sites.push(found.finding);
-        report.maps.push(found.map);
-    }
-    // Of a part of the corpus nothing can be said of what is not found.
-    if options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none() {
-        report.unused = unused;
-    }
-    report.totals = Totals {
-        cases: named.len(),
-        pairs: report.cases.len(),
-        executions: report
-            .cases
-            .iter()
-            .flat_map(|case| &case.results)
-            .map(|result| result.executions)
-            .sum(),
-        refusals: report.refusals.len(),
-        findings: report.findings().count() + report.accepted().count(),
-    };
-    Ok(report)
-}
-
-/// The cases asked for with their effects.
-fn choose(options: &Options) -> Result<Vec<(Subject, Vec<&'static EffectEntry>)>, RunError> {
-    for name in &options.effects {
-        if effect(name).is_none() {
-            return Err(RunError::NoEffect { name: name.clone() });
-        }
-    }
-    let all = subjects()?;
-    for part in &options.cases {
-        if !all.iter().any(|subject| subject.name.contains(part)) {
-            return Err(RunError::NoCase { name: part.clone() });
-        }
-    }
-    let wanted = |subject: &Subject| {
-        options.cases.is_empty() || options.cases.iter().any(|part| subject.name.contains(part))
-    };
-    Ok(all
-        .into_iter()
-        .filter(wanted)
-        .map(|subject| {
-            let effects = subject.effects.iter().copied().filter(|effect| {
-                options.effects.is_empty() || options.effects.iter().any(|name| name == effect.name)
-            });
-            let effects = effects.collect();
-            (subject, effects)
-        })
-        .collect())
-}
-
-/// Opens the executors asked for, in the order they need each other's results in.
-fn open(asked: &[Kind], report: &mut Report) -> Result<Vec<Executor>, RunError> {
-    let mut executors = Vec::new();
-    for kind in Kind::ALL.into_iter().filter(|kind| asked.contains(kind)) {
-        match Executor::open(kind) {
-            Ok(executor) => {
-                let info = executor.info();
-                report.executors.push(ExecutorInfo {
-                    name: kind.to_string(),
-                    api: info.api,
-                    device: info.device,
-                    driver: info.driver,
-                });
-                executors.push(executor);
-            }
-            Err(source) if required(kind.name()) => {
-                return Err(RunError::Required {
-                    name: kind.name(),
-                    source,
-                });
-            }
-            Err(error) => report.notes.push(format!("without {kind}: {error}")),
-        }
-    }
-    Ok(executors)
-}
-
-/// Whether `ETALON_REQUIRE`, a list with commas, names a backend.
-fn required(backend: &str) -> bool {
-    std::env::var("ETALON_REQUIRE")
-        .is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
-}
-
 /// A case and an effect.
-struct Pair<'a> {
-    subject: &'a Subject,
-    effect: &'static EffectEntry,
-    steps: &'a [Step],
-    kernels: &'a KernelLibrary,
-    plant: Option<Plant>,
+pub(super) struct Pair<'a> {
+    pub(super) subject: &'a Subject,
+    pub(super) effect: &'a EffectEntry,
+    pub(super) steps: &'a [Step],
+    pub(super) kernels: &'a KernelLibrary,
+    pub(super) plant: Option<Plant>,
     /// Whether the frame is small enough for [`Kind::is_costly`].
-    followed: bool,
+    pub(super) followed: bool,
 }
 
 /// What all frames of a case stored.
@@ -301,7 +84,7 @@ impl Kept {
 }
 
 impl Pair<'_> {
-    fn run(&self, executors: &mut [Executor], watch: &mut Watch) -> CaseReport {
+    pub(super) fn run(&self, executors: &mut [Executor], watch: &mut Watch) -> CaseReport {
         let Self {
             subject, effect, ..
         } = self;
@@ -380,6 +163,8 @@ impl Pair<'_> {
             }
             match kind {
                 Kind::Cpu => {
+                    findings.extend(watch.checked(kind, executor.take_checked()));
+                    result.untrue = self.truth(&frames);
                     if let Some(finding) = self.recovery(executor, &frames) {
                         findings.push(finding);
                     }
@@ -400,11 +185,7 @@ impl Pair<'_> {
                     }
                 }
                 Kind::Sanitiser => {
-                    findings.extend(executor.take_checked().into_iter().map(|found| Finding {
-                        kind: FindingKind::Check,
-                        executor: kind.to_string(),
-                        text: found.to_string(),
-                    }));
+                    findings.extend(watch.checked(kind, executor.take_checked()));
                     let steps = executor.take_sanitised();
                     let counts = result.sanitised.get_or_insert_default();
                     let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name);
@@ -445,6 +226,15 @@ impl Pair<'_> {
         }
         findings.extend(conclusions(&result));
         result
+    }
+
+    /// What of a case's frames is not what the effect's truth says.
+    fn truth(&self, frames: &Frames) -> Option<truth::Untrue> {
+        let mut judge = truth::Judge::new(self.effect.name, &self.subject.knobs, self.expected())?;
+        for (number, (step, stores)) in self.steps.iter().zip(frames).enumerate() {
+            judge.look(number, step, stores);
+        }
+        judge.finish()
     }
 
     /// The error that the case declares for the effect.
@@ -585,55 +375,4 @@ fn decisions(
     for (steps, (single, double)) in steps.chunks(each).zip(pairs) {
         counts.compare(steps, single, double);
     }
-}
-
-/// What should not be in a result.
-fn conclusions(result: &ExecutorResult) -> Vec<Finding> {
-    let finding = |kind, text| Finding {
-        kind,
-        executor: result.executor.clone(),
-        text,
-    };
-    let mut found = Vec::new();
-    if let Status::Failed { reason } = &result.status {
-        found.push(finding(FindingKind::Failure, reason.clone()));
-    }
-    if let Some(wrong) = &result.non_finite {
-        found.push(finding(
-            FindingKind::NonFinite,
-            format!(
-                "{} channels are no numbers, the first: {}",
-                wrong.channels, wrong.first
-            ),
-        ));
-    }
-    if let Some(wrong) = &result.difference {
-        found.push(finding(
-            FindingKind::Disagreement,
-            format!(
-                "{} texels differ, the first: {}, {:e} in place of {:e}",
-                wrong.texels, wrong.first, wrong.subject, wrong.reference
-            ),
-        ));
-    }
-    if let Some(wrong) = &result.outside {
-        found.push(finding(
-            FindingKind::Outside,
-            format!(
-                "{} texels are outside of what perturbed executions allow, where {} may be, the first: {}, {:e}, \
-                 not within {:e} of {:e}",
-                wrong.texels, wrong.tolerated, wrong.first, wrong.subject, wrong.allowed, wrong.centre
-            ),
-        ));
-    }
-    if let Some(wrong) = result.rounding.as_ref().filter(|wrong| wrong.beyond > 0) {
-        found.push(finding(
-            FindingKind::Rounding,
-            format!(
-                "{} texels are off by more than {:.2e}, the worst by {:.2e}: {}, {:e} in place of {:e}",
-                wrong.beyond, wrong.allowed, wrong.max, wrong.at, wrong.stored, wrong.exact
-            ),
-        ));
-    }
-    found
 }

@@ -1,0 +1,249 @@
+//! Running everything.
+
+mod conclude;
+mod pair;
+
+use etalon_core::backend::BackendError;
+use etalon_core::kernel::KernelLibrary;
+use etalon_effects::{EffectEntry, effect, effects};
+use etalon_scenes::cases::case;
+use thiserror::Error;
+
+use crate::executors::{Executor, Kind};
+use crate::functions;
+use crate::knobs;
+use crate::model::{ExecutorInfo, Report, Totals};
+use crate::plant::Plant;
+use crate::sanitise::{AllowError, Watch};
+use crate::subject::{Subject, SubjectError, subjects};
+pub(crate) use conclude::conclusions;
+use pair::Pair;
+
+/// Default of [`Options::followed`].
+pub const FOLLOWED: usize = 2048;
+
+/// What is run.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Parts of the names of cases; all without one.
+    pub cases: Vec<String>,
+    /// Names of effects, or `lib` for the functions of kernels by themselves; all without
+    /// one.
+    pub effects: Vec<String>,
+    /// Who runs them. Devices are compared with [`Kind::Cpu`], and [`Kind::Double`]
+    /// with [`Kind::Shadow`], where those are among them.
+    pub executors: Vec<Kind>,
+    /// Most texels of a case's frame; larger cases are left out. All are run
+    /// without it.
+    pub largest: Option<usize>,
+    /// Kernels in place of those built in: see [`kernels`](crate::kernels).
+    pub kernels: Vec<(String, String)>,
+    /// Most texels of a frame that the sanitiser and perturbed executions are run on:
+    /// they take far longer than the others.
+    pub followed: usize,
+    /// A fault to be found.
+    pub plant: Option<Plant>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cases: Vec::new(),
+            effects: Vec::new(),
+            executors: Kind::ALL.to_vec(),
+            largest: None,
+            followed: FOLLOWED,
+            kernels: Vec::new(),
+            plant: None,
+        }
+    }
+}
+
+impl Options {
+    /// Whether an effect is among those asked for.
+    fn asks_for(&self, effect: &str) -> bool {
+        self.effects.is_empty() || self.effects.iter().any(|name| name == effect)
+    }
+}
+
+/// Who is told how far it got.
+pub trait Progress {
+    /// So many cases with an effect are to come.
+    fn begin(&mut self, _pairs: usize) {}
+    /// One is next.
+    fn next(&mut self, _case: &str, _effect: &str) {}
+}
+
+impl Progress for () {}
+
+/// Why there is no report.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// No effect of that name.
+    #[error("there is no effect `{name}`; there are {}, and lib", effects().iter().map(|effect| effect.name).collect::<Vec<_>>().join(", "))]
+    NoEffect {
+        /// As given.
+        name: String,
+    },
+    /// No case with that in its name.
+    #[error("no case has `{name}` in its name")]
+    NoCase {
+        /// As given.
+        name: String,
+    },
+    /// A case has no frames.
+    #[error(transparent)]
+    Subject(#[from] SubjectError),
+    /// A comment in a kernel that is for the sanitiser cannot be understood.
+    #[error(transparent)]
+    Allow(#[from] AllowError),
+    /// An executor that `ETALON_REQUIRE` names is not there.
+    #[error("{name} is required: {source}")]
+    Required {
+        /// The executor.
+        name: &'static str,
+        /// Why it is not there.
+        source: BackendError,
+    },
+}
+
+/// Runs the cases on the effects and executors asked for.
+///
+/// # Errors
+/// If there is no such case or effect, a case cannot be made, or a backend that the
+/// variable `ETALON_REQUIRE` lists is not there; what goes wrong in an execution is
+/// in the report.
+pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, RunError> {
+    let chosen = choose(options)?;
+    let mut report = Report::default();
+    let mut executors = open(&options.executors, &mut report)?;
+    let mut watch = Watch::new()?;
+    let mut kernels = KernelLibrary::new();
+    for (path, text) in &options.kernels {
+        kernels.add_source(path, text);
+    }
+    progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
+    let mut named = std::collections::BTreeSet::new();
+    for (subject, effects) in &chosen {
+        let steps = subject.steps()?;
+        let pixels = steps.first().map_or(0, |step| step.frame.size().pixels());
+        if options.largest.is_some_and(|largest| pixels > largest) {
+            continue;
+        }
+        for effect in effects {
+            progress.next(&subject.name, effect.name);
+            named.insert(subject.name.clone());
+            let pair = Pair {
+                subject,
+                effect,
+                steps: &steps,
+                kernels: &kernels,
+                plant: options.plant,
+                followed: pixels <= options.followed,
+            };
+            report.cases.push(pair.run(&mut executors, &mut watch));
+        }
+    }
+    if options.cases.is_empty() && options.asks_for(functions::LIBRARY) {
+        let functions = functions::run(&mut executors, &mut watch, &options.kernels);
+        named.extend(functions.iter().map(|case| case.name.clone()));
+        report.cases.extend(functions);
+    }
+    // Values that are not allowed cost no execution: they are tried whenever no
+    // particular case was asked for.
+    if options.cases.is_empty()
+        && let Some(frames) = case(knobs::FRAMES)
+    {
+        report.refusals = knobs::refusals(frames);
+        report
+            .refusals
+            .retain(|refusal| options.asks_for(&refusal.effect));
+    }
+    let (found, unused) = watch.finish();
+    for found in found {
+        report.sites.push(found.finding);
+        report.maps.push(found.map);
+    }
+    // Of a part of the corpus nothing can be said of what is not found.
+    if options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none() {
+        report.unused = unused;
+    }
+    report.totals = Totals {
+        cases: named.len(),
+        pairs: report.cases.len(),
+        executions: report
+            .cases
+            .iter()
+            .flat_map(|case| &case.results)
+            .map(|result| result.executions)
+            .sum(),
+        refusals: report.refusals.len(),
+        findings: report.findings().count() + report.accepted().count(),
+    };
+    Ok(report)
+}
+
+/// The cases asked for with their effects.
+fn choose(options: &Options) -> Result<Vec<(Subject, Vec<EffectEntry>)>, RunError> {
+    for name in &options.effects {
+        if effect(name).is_none() && name != functions::LIBRARY {
+            return Err(RunError::NoEffect { name: name.clone() });
+        }
+    }
+    let all = subjects()?;
+    for part in &options.cases {
+        if !all.iter().any(|subject| subject.name.contains(part)) {
+            return Err(RunError::NoCase { name: part.clone() });
+        }
+    }
+    let wanted = |subject: &Subject| {
+        options.cases.is_empty() || options.cases.iter().any(|part| subject.name.contains(part))
+    };
+    Ok(all
+        .into_iter()
+        .filter(wanted)
+        .map(|subject| {
+            let effects = subject
+                .effects
+                .iter()
+                .copied()
+                .filter(|effect| options.asks_for(effect.name));
+            let effects = effects.collect();
+            (subject, effects)
+        })
+        .collect())
+}
+
+/// Opens the executors asked for, in the order they need each other's results in.
+fn open(asked: &[Kind], report: &mut Report) -> Result<Vec<Executor>, RunError> {
+    let mut executors = Vec::new();
+    for kind in Kind::ALL.into_iter().filter(|kind| asked.contains(kind)) {
+        match Executor::open(kind) {
+            Ok(executor) => {
+                let info = executor.info();
+                report.executors.push(ExecutorInfo {
+                    name: kind.to_string(),
+                    api: info.api,
+                    device: info.device,
+                    driver: info.driver,
+                });
+                executors.push(executor);
+            }
+            Err(source) if required(kind.name()) => {
+                return Err(RunError::Required {
+                    name: kind.name(),
+                    source,
+                });
+            }
+            Err(error) => report.notes.push(format!("without {kind}: {error}")),
+        }
+    }
+    Ok(executors)
+}
+
+/// Whether `ETALON_REQUIRE`, a list with commas, names a backend.
+fn required(backend: &str) -> bool {
+    std::env::var("ETALON_REQUIRE")
+        .is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
+}

@@ -110,18 +110,7 @@ fn a_steady_frame_creates_nothing() {
         }
         // Both halves of the histories have been used after two frames.
         let (early, late) = (counters[2], counters[5]);
-        let made = |counters: Counters| {
-            (
-                counters.kernels,
-                counters.pipelines,
-                counters.bind_groups,
-                counters.textures,
-                counters.buffers,
-                counters.allocations,
-                counters.bytes,
-            )
-        };
-        assert_eq!(made(early), made(late), "{}", executor.info());
+        assert_eq!(early.made(), late.made(), "{}", executor.info());
         assert!(late.dispatches > early.dispatches);
     }
 }

@@ -7,6 +7,7 @@ pub mod drivers;
 pub mod execute;
 pub mod instructions;
 pub mod measure;
+pub mod plan;
 pub mod setup;
 pub mod size;
 pub mod test_backends;
@@ -40,6 +41,7 @@ enum Task {
     /// Every effect on a corpus of hard cases: numbers everywhere, the same bits on
     /// every backend, rounding bounded; `--help` after it says more.
     Stability(measure::Forwarded),
+    Plan(Box<plan::Options>),
     /// Look whether the interpreter's handlers use vector instructions.
     CheckVectors(vectors::Options),
     /// Count the instructions the interpreter executes for each kernel.
@@ -80,6 +82,11 @@ pub fn main() -> ExitCode {
         ),
         Task::Stability(arguments) => conclude(
             measure::run(measure::STABILITY, &[], &arguments).map_err(|error| error.to_string()),
+        ),
+        Task::Plan(options) => conclude(
+            plan::run(&options)
+                .map(|()| true)
+                .map_err(|error| error.to_string()),
         ),
         Task::CheckVectors(options) => {
             conclude(vectors::run(&options).map_err(|error| error.to_string()))

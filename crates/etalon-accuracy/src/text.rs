@@ -96,7 +96,8 @@ pub(crate) fn time(nanoseconds: f64) -> String {
 }
 
 /// Bytes, in three significant digits.
-pub(crate) fn bytes(bytes: u64) -> String {
+#[must_use]
+pub fn bytes(bytes: u64) -> String {
     let mut value = bytes as f64;
     if value < 1024.0 {
         return format!("{bytes} B");
@@ -113,7 +114,8 @@ pub(crate) fn bytes(bytes: u64) -> String {
 }
 
 /// A whole number, its digits in groups of three.
-pub(crate) fn count(value: u64) -> String {
+#[must_use]
+pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut grouped = String::new();
     for (place, digit) in digits.chars().enumerate() {

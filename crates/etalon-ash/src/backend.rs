@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use etalon_core::backend::{Backend, BackendError, BackendInfo, Counters, Execution, Inputs};
 use etalon_core::plan::{MemoryModel, Plan, ResourceKind};
@@ -272,6 +273,8 @@ pub(crate) fn run(
     recording: u64,
     for_host: bool,
 ) -> Result<(), BackendError> {
+    let transient = &device.tally.transient_bytes;
+    transient.store(prepared.heaps.bytes, Ordering::Relaxed);
     let (uniforms, ring) = match &mut prepared.uniforms {
         Some(ring) => (
             ring.write(&plan.uniforms, recording, device.completed())?,

@@ -65,8 +65,12 @@ pub(crate) struct Tally {
     pub(crate) buffers: AtomicU64,
     pub(crate) allocations: AtomicU64,
     pub(crate) bytes: AtomicU64,
+    pub(crate) transient_bytes: AtomicU64,
+    pub(crate) passes: AtomicU64,
     pub(crate) dispatches: AtomicU64,
+    pub(crate) draws: AtomicU64,
     pub(crate) barriers: AtomicU64,
+    pub(crate) invocations: AtomicU64,
 }
 
 /// Counts `amount` more.
@@ -85,8 +89,14 @@ impl Tally {
             buffers: read(&self.buffers),
             allocations: read(&self.allocations),
             bytes: read(&self.bytes),
+            transient_bytes: read(&self.transient_bytes),
+            passes: read(&self.passes),
             dispatches: read(&self.dispatches),
+            draws: read(&self.draws),
             barriers: read(&self.barriers),
+            invocations: read(&self.invocations),
+            // Only the device knows.
+            indirect_invocations: 0,
         }
     }
 }

@@ -37,6 +37,8 @@ pub(crate) struct Heaps {
     pub(crate) transients: Vec<Option<Resource>>,
     /// By number in the plan: whether a transient has memory of its own.
     pub(crate) apart: Vec<bool>,
+    /// What they take, shared memory counted once.
+    pub(crate) bytes: u64,
 }
 
 /// A transient and what it needs.
@@ -52,6 +54,7 @@ impl Heaps {
         let mut this = Self {
             transients: vec![None; plan.resources.len()],
             apart: vec![false; plan.resources.len()],
+            bytes: 0,
         };
         let mut textures = Vec::new();
         let mut buffers = Vec::new();
@@ -114,6 +117,7 @@ impl Heaps {
             } else {
                 "transient textures"
             };
+            self.bytes = self.bytes.saturating_add(bytes);
             let requirements = vk::MemoryRequirements {
                 size: bytes,
                 alignment,
@@ -135,6 +139,9 @@ impl Heaps {
             let shared = memory.as_ref().filter(|_| shares);
             let name = &planned.name;
             self.apart[tenant.resource] = shared.is_none();
+            if shared.is_none() {
+                self.bytes = self.bytes.saturating_add(tenant.needed.memory.size);
+            }
             self.transients[tenant.resource] = Some(match &planned.desc {
                 ResourceDesc::Texture(desc) => {
                     let flags = usage::image_flags(planned.usages);

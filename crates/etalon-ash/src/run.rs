@@ -10,14 +10,13 @@ use etalon_core::plan::{Barrier, Bound, Groups, Plan, Step, UsageSet};
 
 use crate::buffer::Buffer;
 use crate::commands::{Barriers, Commands, Transition};
-use crate::device::count;
+use crate::device::{Tally, count};
 use crate::error::malformed;
 use crate::image::Image;
 use crate::pipeline::Pipeline;
 use crate::texels::Texels;
 use crate::usage::Shaders;
 use crate::{Resource, usage};
-pub(crate) use raster::is_empty;
 
 /// Where the bytes of one capture go.
 #[derive(Debug)]
@@ -84,6 +83,7 @@ impl Run<'_> {
             };
             commands.end_label();
             result?;
+            count_work(&commands.device.tally, &step.step);
         }
         self.barriers(commands, &self.plan.final_barriers, shaders, &mut barriers)?;
         if let Some([source, target]) = shaders.come_to_rest() {
@@ -220,7 +220,7 @@ impl Run<'_> {
         bindings: &[Bound],
         groups: &Groups,
     ) -> Result<(), BackendError> {
-        if matches!(groups, Groups::Direct(counts) if counts.contains(&0)) {
+        if groups.is_none() {
             return Ok(());
         }
         self.bind(commands, index, bindings)?;
@@ -282,6 +282,12 @@ impl Run<'_> {
             _ => Err(malformed(format!("capture {index} has no place to go"))),
         }
     }
+}
+
+/// Counts a step that has been recorded.
+fn count_work(tally: &Tally, step: &Step) {
+    count(&tally.passes, u64::from(step.works()));
+    count(&tally.invocations, step.invocations().unwrap_or(0));
 }
 
 /// What a barrier is in Vulkan. `own_uses` are the uses of a transient that has

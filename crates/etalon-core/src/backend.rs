@@ -12,6 +12,7 @@ use std::fmt;
 use serde::Serialize;
 use thiserror::Error;
 
+pub use crate::counters::Counters;
 use crate::image::ImageData;
 use crate::kernel::Need;
 use crate::plan::{MemoryModel, Plan, TightMemory};
@@ -133,30 +134,6 @@ impl Execution {
                 _ => None,
             })
     }
-}
-
-/// What a backend has made and done since it was created. The difference of
-/// two readings is what happened between them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct Counters {
-    /// Kernels translated for this backend (shader modules, bytecode).
-    pub kernels: u64,
-    /// Pipelines created.
-    pub pipelines: u64,
-    /// Descriptor sets or bind groups created.
-    pub bind_groups: u64,
-    /// Textures created.
-    pub textures: u64,
-    /// Buffers created.
-    pub buffers: u64,
-    /// Device memory allocations made.
-    pub allocations: u64,
-    /// Bytes of device memory held now.
-    pub bytes: u64,
-    /// Kernels run: dispatches and draws.
-    pub dispatches: u64,
-    /// Barriers recorded.
-    pub barriers: u64,
 }
 
 /// Why a backend cannot be had, or cannot run a plan.

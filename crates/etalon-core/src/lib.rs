@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 pub mod backend;
+mod counters;
 pub mod format;
 pub mod graph;
 pub mod image;

@@ -89,8 +89,19 @@ pub fn chain(
         Some(settings) => ssr(graph, inputs, settings)?,
         None => inputs.colour,
     };
+    on_light(graph, light, inputs.delta_time, settings)
+}
+
+/// The effects that read nothing but light: exposure, bloom, composite. Settings have
+/// been checked.
+pub(crate) fn on_light(
+    graph: &mut Graph,
+    light: Texture,
+    delta_time: f32,
+    settings: &ChainSettings,
+) -> Result<Chain, EffectError> {
     let adaptation = match &settings.exposure {
-        Some(settings) => Some(exposure(graph, light, inputs.delta_time, settings)?),
+        Some(settings) => Some(exposure(graph, light, delta_time, settings)?),
         None => None,
     };
     let exposed = Exposed {

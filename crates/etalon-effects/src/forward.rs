@@ -15,6 +15,8 @@
 //! one forward pass with many lights that writes a thin G-buffer of normals and
 //! specular colour beside the light.
 
+pub(crate) mod demand;
+
 use etalon_core::Format;
 use etalon_core::graph::{Buffer, ClearValue, Draw, Graph, Load, Texture};
 use etalon_core::raster::{Blend, CullMode, DepthState, TargetState};

@@ -16,8 +16,9 @@
 //! | [`bloom`](mod@bloom) | glow of bright light | `shaders/bloom` |
 //! | [`composite`](mod@composite) | tone curve and encoding | `shaders/composite` |
 //!
-//! [`chain`](mod@chain) runs those that a frame asks for; [`registry`] knows
-//! all of them by name.
+//! [`chain`](mod@chain) runs those that are on; [`frame`](mod@frame) runs those of them
+//! that what is on the screen calls for, as [`demand`] says it. [`registry`] knows all
+//! of them by name.
 //!
 //! # Settings
 //! Settings are plain structs. Each field says what it does to the picture, its
@@ -40,10 +41,12 @@ pub mod budget;
 pub mod chain;
 mod check;
 pub mod composite;
+pub mod demand;
 pub mod environment;
 mod error;
 pub mod exposure;
 pub mod forward;
+pub mod frame;
 pub mod geometry;
 pub mod knob;
 pub mod lighting;

@@ -1,14 +1,15 @@
 //! Every effect by name, for whatever runs them all: comparison, measurement,
 //! the command line.
 
-use etalon_core::graph::{Graph, Texture};
+use etalon_core::graph::{Decision, Graph, Texture};
 
-use crate::bloom::{Bloom, bloom};
+use crate::bloom::{self, Bloom, bloom};
 use crate::chain::{ChainSettings, chain};
-use crate::composite::{Composite, composite};
-use crate::exposure::{Exposed, Exposure, exposure};
+use crate::composite::{self, Composite, composite};
+use crate::demand::{Calls, Need};
+use crate::exposure::{self, Exposed, Exposure, exposure};
 use crate::knob::{KnobError, KnobInfo, KnobValue, Tunable, infos, tuned};
-use crate::ssr::{Ssr, ssr};
+use crate::ssr::{self, Ssr, ssr};
 use crate::{EffectError, SceneInputs};
 
 /// Declares an effect with some knobs set and returns its result.
@@ -31,29 +32,48 @@ pub struct EffectEntry {
     pub name: &'static str,
     /// What it does, in a sentence.
     pub description: &'static str,
+    /// Images of the frame that it reads beside the light.
+    pub needs: &'static [Need],
     knobs: fn() -> Vec<KnobInfo>,
     how: How,
+    decide: fn(&Calls<'_>) -> Decision,
 }
 
 impl EffectEntry {
-    const fn of<S: Tunable>(description: &'static str, declare: DeclareWith) -> Self {
+    const fn of<S: Tunable>(
+        description: &'static str,
+        declare: DeclareWith,
+        needs: &'static [Need],
+        decide: fn(&Calls<'_>) -> Decision,
+    ) -> Self {
         Self {
             name: S::EFFECT,
             description,
+            needs,
             knobs: infos::<S>,
             how: How::Tuned(declare),
+            decide,
         }
     }
 
-    /// An effect, or several as one, with settings of its own that are no knobs.
+    /// An effect, or several as one, with settings of its own that are no knobs. It is
+    /// taken to read every image of the frame, and to be called for always.
     #[must_use]
     pub const fn fixed(name: &'static str, description: &'static str, declare: Declare) -> Self {
         Self {
             name,
             description,
+            needs: ssr::demand::NEEDS,
             knobs: Vec::new,
             how: How::Fixed(declare),
+            decide: composite::demand::decide,
         }
+    }
+
+    /// Whether a frame calls for it, and why or why not.
+    #[must_use]
+    pub fn decide(&self, calls: &Calls<'_>) -> Decision {
+        (self.decide)(calls)
     }
 
     /// Its settings as data; none for `chain`, which has those of all others.
@@ -106,18 +126,26 @@ const EFFECTS: &[EffectEntry] = &[
     EffectEntry::of::<Ssr>(
         "Screen-space reflection by a march across the screen and bisection",
         |graph, inputs, values| ssr(graph, inputs, &tuned(values)?),
+        ssr::demand::NEEDS,
+        ssr::demand::decide,
     ),
     EffectEntry::of::<Exposure>(
         "Automatic exposure from the picture's average luminance",
         |graph, inputs, values| exposure(graph, inputs.colour, inputs.delta_time, &tuned(values)?),
+        exposure::demand::NEEDS,
+        exposure::demand::decide,
     ),
     EffectEntry::of::<Bloom>(
         "The glow of bright light, by halving and doubling the picture's size",
         |graph, inputs, values| bloom(graph, inputs.colour, Exposed::default(), &tuned(values)?),
+        bloom::demand::NEEDS,
+        bloom::demand::decide,
     ),
     EffectEntry::of::<Composite>(
         "Tone curve and encoding for the display",
         |graph, inputs, values| composite(graph, inputs.colour, None, None, &tuned(values)?),
+        composite::demand::NEEDS,
+        composite::demand::decide,
     ),
     EffectEntry::fixed(
         "chain",

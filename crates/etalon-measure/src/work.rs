@@ -233,7 +233,9 @@ fn work(
             })?);
             steps.push(PlannedStep {
                 name: step.name.clone(),
+                effect: step.effect.clone(),
                 reason: step.reason.clone(),
+                goal: step.goal.clone(),
                 barriers: Vec::new(),
                 step: Step::Dispatch {
                     kernel: reference.clone(),
@@ -285,6 +287,7 @@ fn work(
             heap_alignment: plan.heap_alignment,
             unaliased_bytes: 0,
             culled: Vec::new(),
+            effects: Vec::new(),
             uniforms: plan.uniforms.clone(),
         },
         uses,
@@ -312,7 +315,9 @@ fn capture(plan: &Plan, resource: u32) -> PlannedStep {
     };
     PlannedStep {
         name: format!("capture {}", planned.name),
+        effect: String::new(),
         reason: "to run what follows alone".to_owned(),
+        goal: String::new(),
         barriers: Vec::new(),
         step: Step::Capture {
             resource,

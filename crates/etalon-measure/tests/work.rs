@@ -70,7 +70,9 @@ fn outcomes(
             .unwrap();
         plan.steps.push(PlannedStep {
             name: format!("capture {pass} {binding}"),
+            effect: String::new(),
             reason: String::new(),
+            goal: String::new(),
             barriers: Vec::new(),
             step: Step::Capture {
                 resource: resource as u32,

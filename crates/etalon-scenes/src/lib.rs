@@ -7,6 +7,7 @@
 //! * [`models`](mod@models): a registry of procedural models.
 //! * [`scenes`](mod@scenes): a registry of procedural scenes.
 //! * [`cases`](mod@cases): inputs that are known to be hard, with their reasons.
+//! * [`demand`](mod@demand): what scenes call for, told before they are drawn.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
 //! * [`picture`]: images as PNG files to look at.
 //!
@@ -30,6 +31,7 @@
 
 pub mod camera;
 pub mod cases;
+pub mod demand;
 pub mod exr_frame;
 pub mod frame;
 mod import;

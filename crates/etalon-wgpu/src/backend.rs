@@ -255,6 +255,7 @@ impl WgpuBackend {
                 _ => None,
             };
             record(encoder, gpu, plan, prepared, &physicals, timing);
+            gpu.tally.runs_with(prepared.transient_bytes());
         })
         .map_err(|fault| fault.of("record", "the plan", 0))?;
         Ok(physicals)

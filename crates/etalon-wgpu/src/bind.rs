@@ -253,7 +253,8 @@ impl BindContext<'_> {
                     })
             })
             .map_err(|fault| fault.of("create_bind_group", step, 0))?;
-        self.gpu.tally.bind_groups.add(1);
+        let binds = !entries.is_empty();
+        self.gpu.tally.bind_groups.add(u64::from(binds));
         Ok(group)
     }
 

@@ -216,6 +216,15 @@ impl Prepared {
         Ok(())
     }
 
+    /// What the transients take.
+    pub(crate) fn transient_bytes(&self) -> u64 {
+        let bytes = self.transients.values().map(|own| match own {
+            Own::Texture(texture) => texture.bytes(),
+            Own::Buffer(buffer) => buffer.bytes(),
+        });
+        bytes.sum()
+    }
+
     /// The transient in a slot.
     pub(crate) fn transient(&self, slot: u32) -> Option<Physical> {
         self.transients.get(&slot).map(Own::physical)

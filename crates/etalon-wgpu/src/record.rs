@@ -37,7 +37,7 @@ pub(crate) fn prepare_steps(
                     groups: count,
                 },
                 PreparedStep::Dispatch { pipeline, groups },
-            ) if !empty(count) => {
+            ) if !count.is_none() => {
                 groups.select(touched(bindings, physicals), || {
                     context.group(&planned.name, &kernel.0, &pipeline.layout, bindings)
                 })?;
@@ -61,11 +61,6 @@ pub(crate) fn prepare_steps(
     Ok(())
 }
 
-/// Whether a dispatch does nothing.
-fn empty(groups: &Groups) -> bool {
-    matches!(groups, Groups::Direct(groups) if groups.contains(&0))
-}
-
 /// Records every step. Without `timing`, dispatches that follow each other
 /// share a pass; with it, each has one of its own, whose time is taken. Draws of
 /// a step are a pass of their own either way. Timing by the host submits and
@@ -83,6 +78,7 @@ pub(crate) fn record(
         plan,
         physicals,
     };
+    gpu.tally.barriers.add(plan.final_barriers.len() as u64);
     match timing {
         Some(Timing::Device(queries)) => {
             let stamps = queries.stamps(&plan.steps);
@@ -147,6 +143,16 @@ impl Recorder<'_> {
         }
     }
 
+    /// Counts a step that is recorded.
+    fn count(&self, planned: &PlannedStep) {
+        let tally = &self.gpu.tally;
+        tally.barriers.add(planned.barriers.len() as u64);
+        tally.passes.add(u64::from(planned.step.works()));
+        tally
+            .invocations
+            .add(planned.step.invocations().unwrap_or(0));
+    }
+
     /// One step, between two timestamps if there are any.
     fn timed(
         &self,
@@ -160,7 +166,7 @@ impl Recorder<'_> {
             return;
         }
         let runs = match &planned.step {
-            Step::Dispatch { groups, .. } => !empty(groups),
+            Step::Dispatch { groups, .. } => !groups.is_none(),
             _ => false,
         };
         if runs {
@@ -188,6 +194,7 @@ impl Recorder<'_> {
         raster: &Raster,
         stamp: Option<Stamp<'_>>,
     ) {
+        self.count(planned);
         if let Step::Raster(step) = &planned.step {
             let recording = Recording {
                 gpu: self.gpu,
@@ -204,12 +211,13 @@ impl Recorder<'_> {
         planned: &PlannedStep,
         step: &PreparedStep,
     ) {
+        self.count(planned);
         let (Step::Dispatch { groups: count, .. }, PreparedStep::Dispatch { pipeline, groups }) =
             (&planned.step, step)
         else {
             return;
         };
-        if empty(count) {
+        if count.is_none() {
             return;
         }
         pass.set_pipeline(&pipeline.raw);
@@ -233,6 +241,7 @@ impl Recorder<'_> {
         planned: &PlannedStep,
         step: &PreparedStep,
     ) {
+        self.count(planned);
         // What is not there has been refused when the plan was prepared.
         let _: Option<()> = (|| {
             match (&planned.step, step) {

@@ -16,8 +16,13 @@ pub(crate) struct Tally {
     pub(crate) textures: Count,
     pub(crate) buffers: Count,
     pub(crate) views: Count,
+    pub(crate) passes: Count,
     pub(crate) dispatches: Count,
+    pub(crate) draws: Count,
+    pub(crate) barriers: Count,
+    pub(crate) invocations: Count,
     bytes: AtomicU64,
+    transient_bytes: AtomicU64,
 }
 
 impl Tally {
@@ -33,10 +38,22 @@ impl Tally {
             // wgpu allocates once for each, from blocks of its own.
             allocations: textures + buffers,
             bytes: self.bytes.load(Ordering::Relaxed),
+            transient_bytes: self.transient_bytes.load(Ordering::Relaxed),
+            passes: self.passes.get(),
             dispatches: self.dispatches.get(),
-            // wgpu records its own, and tells nobody.
-            barriers: 0,
+            draws: self.draws.get(),
+            // wgpu's own, which do the same, are told to nobody.
+            barriers: self.barriers.get(),
+            invocations: self.invocations.get(),
+            // Only the device knows.
+            indirect_invocations: 0,
         }
+    }
+
+    /// Takes note of the transients of the plan that runs.
+    pub(crate) fn runs_with(&self, transient_bytes: u64) {
+        self.transient_bytes
+            .store(transient_bytes, Ordering::Relaxed);
     }
 }
 
@@ -70,6 +87,11 @@ impl<T> Owned<T> {
             bytes,
             tally: tally.clone(),
         }
+    }
+
+    /// What it takes.
+    pub(crate) const fn bytes(&self) -> u64 {
+        self.bytes
     }
 }
 

@@ -3,6 +3,8 @@
 mod accuracy;
 mod agreement;
 mod bad_vertices;
+mod counters;
+mod demands;
 mod economy;
 mod environment;
 mod forward;

@@ -17,7 +17,7 @@ use thiserror::Error;
 use crate::size::Size;
 
 /// Seconds between frames: a constant, as results may not depend on clocks.
-const DELTA_TIME: f32 = 1.0 / 60.0;
+pub(crate) const DELTA_TIME: f32 = 1.0 / 60.0;
 
 /// Seconds of a model's animation that have passed.
 const TIME: f64 = 0.5;

@@ -17,7 +17,7 @@ use crate::store::{self, StoreError};
 pub use csv::csv;
 pub use html::{page, render};
 
-pub use crate::text::escape;
+pub use crate::text::{bytes, count, escape};
 
 /// The page's name in the folder of a report.
 pub const PAGE: &str = "index.html";

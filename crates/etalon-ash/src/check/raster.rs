@@ -12,7 +12,6 @@ use etalon_core::raster::{IndexFormat, NumberKind, StepMode};
 
 use super::Checker;
 use crate::error::{malformed, unsupported};
-use crate::run::is_empty;
 use crate::{convert, pipeline, stages};
 
 /// A feature and what asks for it, in words.
@@ -195,7 +194,7 @@ impl Drawn<'_> {
         self.outputs(interface)?;
         self.layouts(interface)?;
         // Buffers are not touched by a draw of nothing.
-        if is_empty(draw) {
+        if draw.extent.is_none() {
             return Ok(());
         }
         for vertices in &draw.vertices {

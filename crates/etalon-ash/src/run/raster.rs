@@ -8,18 +8,6 @@ use super::Run;
 use crate::commands::{Attachment, Commands, Extent};
 use crate::device::count;
 
-/// Whether a draw draws nothing, as far as the plan tells.
-pub(crate) fn is_empty(draw: &PlannedDraw) -> bool {
-    match &draw.extent {
-        DrawExtent::Direct {
-            elements,
-            instances,
-            ..
-        } => elements.is_empty() || instances.is_empty(),
-        DrawExtent::Indirect { draws, .. } => *draws == 0,
-    }
-}
-
 impl Run<'_> {
     /// Draws; `first` is the number of the first draw among the plan's
     /// dispatches and draws.
@@ -44,7 +32,7 @@ impl Run<'_> {
         // What has begun must end, whatever happens.
         let result = (first..)
             .zip(&raster.draws)
-            .filter(|(_, draw)| !is_empty(draw))
+            .filter(|(_, draw)| !draw.extent.is_none())
             .try_for_each(|(index, draw)| self.draw(commands, index, draw));
         commands.end_drawing();
         result
@@ -93,7 +81,7 @@ impl Run<'_> {
             },
         };
         commands.draw(&extent, draw.indices.is_some());
-        count(&commands.device.tally.dispatches, 1);
+        count(&commands.device.tally.draws, 1);
         Ok(())
     }
 }

@@ -555,7 +555,9 @@ fn wrong_bindings_are_named_before_anything_is_made() {
         let mut captured = plan.clone();
         captured.steps.push(etalon_core::plan::PlannedStep {
             name: "capture it".to_owned(),
+            effect: String::new(),
             reason: String::new(),
+            goal: String::new(),
             barriers: Vec::new(),
             step: etalon_core::plan::Step::Capture {
                 resource: 0,

@@ -30,6 +30,7 @@
 //! layers it names: what was there before is not kept, and a texel the kernel
 //! does not write is undefined. `update` reads and writes in place.
 
+mod decision;
 mod error;
 mod handle;
 mod pass;
@@ -37,12 +38,13 @@ mod raster;
 mod uniform;
 
 use std::borrow::Cow;
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde::Serialize;
 
+pub use decision::Decision;
 pub use error::GraphError;
 pub(crate) use handle::GraphId;
 pub use handle::{Buffer, Subresources, Texture, TextureView};
@@ -222,6 +224,7 @@ pub struct Graph {
     pub(crate) passes: Vec<Pass>,
     pub(crate) outputs: Vec<Output>,
     pub(crate) histories: Vec<HistoryPair>,
+    pub(crate) decisions: BTreeMap<String, Decision>,
     imports: BTreeSet<String>,
     pass_names: HashMap<String, u32>,
     resource_names: HashMap<String, u32>,
@@ -255,6 +258,7 @@ impl Graph {
             passes: Vec::new(),
             outputs: Vec::new(),
             histories: Vec::new(),
+            decisions: BTreeMap::new(),
             imports: BTreeSet::new(),
             pass_names: HashMap::new(),
             resource_names: HashMap::new(),
@@ -385,6 +389,15 @@ impl Graph {
             previous: handle(previous),
             current: handle(current),
         })
+    }
+
+    /// Notes what was decided of an effect, for the plan to tell. A later decision
+    /// takes the place of an earlier one.
+    ///
+    /// An effect is known by what its passes' names begin with: `ssr` of `ssr/march`.
+    /// Of a part of one, such as `forward/glass`, can be decided by itself.
+    pub fn decide(&mut self, effect: impl Into<String>, decision: Decision) {
+        self.decisions.insert(effect.into(), decision);
     }
 
     /// The description behind a handle.

@@ -13,8 +13,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use crate::graph::ResourceDesc;
 use crate::plan::lifetime::{Ordered, OrderedStep};
 use crate::plan::{
-    CulledPass, MemoryModel, MemoryNeed, Placement, PlanError, PlannedHistory, PlannedResource,
-    ResourceKind, UsageSet,
+    CulledPass, MemoryModel, MemoryNeed, Placement, PlanError, PlannedEffect, PlannedHistory,
+    PlannedResource, ResourceKind, UsageSet,
 };
 
 /// Everything but the barriers.
@@ -26,6 +26,7 @@ pub(crate) struct Placed {
     pub(crate) tenants_before: Vec<UsageSet>,
     pub(crate) histories: Vec<PlannedHistory>,
     pub(crate) culled: Vec<CulledPass>,
+    pub(crate) effects: Vec<PlannedEffect>,
     pub(crate) uniforms: Vec<u8>,
     pub(crate) texture_heap: u64,
     pub(crate) buffer_heap: u64,
@@ -40,6 +41,7 @@ pub(crate) fn place(ordered: Ordered, memory: &dyn MemoryModel) -> Result<Placed
         mut resources,
         histories,
         culled,
+        effects,
         uniforms,
     } = ordered;
     let needs: Vec<Option<MemoryNeed>> = resources
@@ -119,6 +121,7 @@ pub(crate) fn place(ordered: Ordered, memory: &dyn MemoryModel) -> Result<Placed
         tenants_before,
         histories,
         culled,
+        effects,
         uniforms,
         texture_heap: textures.size,
         buffer_heap: buffers.size,

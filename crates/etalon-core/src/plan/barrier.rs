@@ -40,7 +40,9 @@ pub(crate) fn finish(placed: Placed, arithmetic: Arithmetic) -> Plan {
         }
         steps.push(PlannedStep {
             name: step.name,
+            effect: step.effect,
             reason: step.reason,
+            goal: step.goal,
             barriers,
             step: step.step,
         });
@@ -75,6 +77,7 @@ pub(crate) fn finish(placed: Placed, arithmetic: Arithmetic) -> Plan {
         heap_alignment: placed.heap_alignment,
         unaliased_bytes: placed.unaliased_bytes,
         culled: placed.culled,
+        effects: placed.effects,
         uniforms: placed.uniforms,
     }
 }

@@ -1,4 +1,4 @@
-//! Phase 2: kernels are compiled, and what they declare is held against what
+//! Phase 3: kernels are compiled, and what they declare is held against what
 //! the passes declare.
 
 use crate::format::{SampleKind, StorageSupport};
@@ -35,27 +35,28 @@ pub(crate) struct BoundPass {
 /// The live passes, bound, and the contents of their uniform blocks.
 #[derive(Debug)]
 pub(crate) struct BoundPasses {
-    /// Per pass of the graph; `None` for culled ones.
-    pub(crate) passes: Vec<Option<BoundPass>>,
+    /// In the order they run.
+    pub(crate) passes: Vec<BoundPass>,
     pub(crate) uniforms: Vec<u8>,
 }
 
-/// Binds every live pass.
+/// Binds the live passes, whose indices are given in the order they run.
 pub(crate) fn bind(
     graph: &Graph,
     live: &Live,
+    order: &[u32],
     kernels: &KernelLibrary,
     options: &PlanOptions<'_>,
 ) -> Result<BoundPasses, PlanError> {
     check_resources(graph, live, options)?;
     let mut uniforms = Vec::new();
-    let mut passes = Vec::with_capacity(graph.passes.len());
-    for (index, pass) in graph.passes.iter().enumerate() {
-        passes.push(match live.needs[index] {
-            Some(_) => Some(bind_pass(graph, pass, kernels, options, &mut uniforms)?),
-            None => None,
-        });
-    }
+    let passes = order
+        .iter()
+        .map(|&index| {
+            let pass = &graph.passes[index as usize];
+            bind_pass(graph, pass, kernels, options, &mut uniforms)
+        })
+        .collect::<Result<_, _>>()?;
     Ok(BoundPasses { passes, uniforms })
 }
 

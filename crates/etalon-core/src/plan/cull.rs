@@ -14,33 +14,49 @@ pub(crate) enum Need {
     History(u32),
 }
 
+/// For whose sake a pass runs in the end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Goal {
+    /// The output of this index.
+    Output(u32),
+    /// The history of this index.
+    History(u32),
+}
+
 /// What runs.
 #[derive(Debug)]
 pub(crate) struct Live {
     /// Per pass: why it runs, if it does.
     pub(crate) needs: Vec<Option<Need>>,
+    /// Per pass: for whose sake, if it runs.
+    pub(crate) goals: Vec<Option<Goal>>,
     /// Indices of the histories whose last contents are read.
     pub(crate) histories: Vec<u32>,
 }
 
-/// Walks from the outputs to everything they need.
+/// Walks from the outputs, by name, to everything they need: of several needs the
+/// first is told, and which that is does not depend on the order of declarations.
 pub(crate) fn cull(graph: &Graph) -> Result<Live, PlanError> {
     let mut live = Live {
         needs: vec![None; graph.passes.len()],
+        goals: vec![None; graph.passes.len()],
         histories: Vec::new(),
     };
     let mut history_live = vec![false; graph.histories.len()];
     let mut pending = Vec::new();
-    for (index, output) in graph.outputs.iter().enumerate() {
+    for index in by_name(graph) {
+        let output = &graph.outputs[index as usize];
+        let goal = Goal::Output(index);
         let writers = &graph.resources[output.resource as usize].versions[output.version as usize];
         for writer in writers.iter().flatten() {
-            reach(&mut live, &mut pending, *writer, Need::Output(index as u32));
+            let need = (Need::Output(index), goal);
+            reach(&mut live, &mut pending, *writer, need);
         }
         if let Origin::HistoryPrevious(history) = graph.resources[output.resource as usize].origin {
             reach_history(graph, &mut live, &mut pending, &mut history_live, history)?;
         }
     }
-    while let Some(pass) = pending.pop() {
+    while let Some((pass, goal)) = pending.pop() {
         for access in graph.passes[pass as usize]
             .accesses
             .iter()
@@ -51,7 +67,8 @@ pub(crate) fn cull(graph: &Graph) -> Result<Live, PlanError> {
             let writers = &resource.versions[access.version as usize];
             for index in access.range.indices(layers) {
                 if let Some(writer) = writers.get(index).copied().flatten() {
-                    reach(&mut live, &mut pending, writer, Need::Pass(pass));
+                    let need = (Need::Pass(pass), goal);
+                    reach(&mut live, &mut pending, writer, need);
                 }
             }
             if let Origin::HistoryPrevious(history) = resource.origin {
@@ -65,11 +82,22 @@ pub(crate) fn cull(graph: &Graph) -> Result<Live, PlanError> {
     Ok(live)
 }
 
-fn reach(live: &mut Live, pending: &mut Vec<u32>, pass: u32, need: Need) {
+/// The outputs' indices, by the outputs' names.
+pub(crate) fn by_name(graph: &Graph) -> Vec<u32> {
+    let mut outputs: Vec<u32> = (0..graph.outputs.len() as u32).collect();
+    outputs.sort_by_key(|&index| &graph.outputs[index as usize].name);
+    outputs
+}
+
+/// Passes that run, whose needs are still to be followed.
+type Pending = Vec<(u32, Goal)>;
+
+fn reach(live: &mut Live, pending: &mut Pending, pass: u32, (need, goal): (Need, Goal)) {
     let slot = &mut live.needs[pass as usize];
     if slot.is_none() {
         *slot = Some(need);
-        pending.push(pass);
+        live.goals[pass as usize] = Some(goal);
+        pending.push((pass, goal));
     }
 }
 
@@ -77,7 +105,7 @@ fn reach(live: &mut Live, pending: &mut Vec<u32>, pass: u32, need: Need) {
 fn reach_history(
     graph: &Graph,
     live: &mut Live,
-    pending: &mut Vec<u32>,
+    pending: &mut Pending,
     reached: &mut [bool],
     history: u32,
 ) -> Result<(), PlanError> {
@@ -93,7 +121,8 @@ fn reach_history(
         });
     }
     for writer in writers.iter().flatten() {
-        reach(live, pending, *writer, Need::History(history));
+        let need = (Need::History(history), Goal::History(history));
+        reach(live, pending, *writer, need);
     }
     Ok(())
 }

@@ -2,17 +2,19 @@
 
 use crate::graph::{Graph, Origin, Subresources};
 use crate::plan::bind::{BoundPasses, Use};
-use crate::plan::cull::Live;
+use crate::plan::cull::{Live, by_name};
 use crate::plan::{
-    Bound, Capture, CulledPass, Groups, Placement, PlannedHistory, PlannedResource, ResourceKind,
-    Step, Usage, UsageSet, explain,
+    Bound, Capture, CulledPass, Groups, Placement, PlannedEffect, PlannedHistory, PlannedResource,
+    ResourceKind, Step, Usage, UsageSet, explain,
 };
 
 /// A step before its barriers are known.
 #[derive(Debug)]
 pub(crate) struct OrderedStep {
     pub(crate) name: String,
+    pub(crate) effect: String,
     pub(crate) reason: String,
+    pub(crate) goal: String,
     pub(crate) step: Step,
     pub(crate) uses: Vec<Use>,
 }
@@ -24,6 +26,7 @@ pub(crate) struct Ordered {
     pub(crate) resources: Vec<PlannedResource>,
     pub(crate) histories: Vec<PlannedHistory>,
     pub(crate) culled: Vec<CulledPass>,
+    pub(crate) effects: Vec<PlannedEffect>,
     pub(crate) uniforms: Vec<u8>,
 }
 
@@ -35,21 +38,15 @@ pub(crate) fn steps(
     order: &[u32],
     capture: Capture,
 ) -> Ordered {
-    let BoundPasses {
-        mut passes,
-        uniforms,
-    } = bound;
+    let BoundPasses { passes, uniforms } = bound;
     let mut steps = Vec::with_capacity(order.len());
-    for &index in order {
-        let (Some(bound), Some(need)) = (passes[index as usize].take(), live.needs[index as usize])
-        else {
-            continue;
-        };
+    for (&index, bound) in order.iter().zip(passes) {
         let pass = &graph.passes[index as usize];
-        let reason = explain::reason(graph, need);
         steps.push(OrderedStep {
             name: pass.name.clone(),
-            reason,
+            effect: explain::effect_of(&pass.name).to_owned(),
+            reason: explain::reason(graph, live.needs[index as usize]),
+            goal: explain::goal(graph, live.goals[index as usize]),
             step: bound.step,
             uses: bound.uses,
         });
@@ -65,7 +62,8 @@ pub(crate) fn steps(
         }
     }
     if capture == Capture::Outputs {
-        for output in &graph.outputs {
+        for index in by_name(graph) {
+            let output = &graph.outputs[index as usize];
             let (mips, layers) = graph.resources[output.resource as usize]
                 .desc
                 .subresources();
@@ -94,6 +92,7 @@ pub(crate) fn steps(
         resources: numbering.resources,
         histories,
         culled: explain::culled(graph, live),
+        effects: explain::effects(graph, live),
         uniforms,
     }
 }
@@ -101,7 +100,9 @@ pub(crate) fn steps(
 fn capture_step(pass: &str, binding: &str, resource: u32, range: Subresources) -> OrderedStep {
     OrderedStep {
         name: format!("capture {pass}/{binding}"),
+        effect: String::new(),
         reason: "asked for by the caller".to_owned(),
+        goal: String::new(),
         step: Step::Capture {
             resource,
             range,
@@ -240,7 +241,8 @@ impl Numbering<'_> {
 
     /// Outputs outlive the plan, so they are not transient.
     fn outputs(&mut self, steps: u32) {
-        for output in &self.graph.outputs {
+        for index in by_name(self.graph) {
+            let output = &self.graph.outputs[index as usize];
             let number = self.number(output.resource, steps.saturating_sub(1));
             let resource = &mut self.resources[number as usize];
             let rest = match resource.desc {

@@ -3,14 +3,18 @@
 //! Planning is one function made of named phases, each a module of its own:
 //!
 //! 1. `cull`: what no output asks for goes, transitively.
-//! 2. `bind`: the kernels of what is left are compiled (or found compiled),
+//! 2. `order`: passes are put in an order that respects every version, and
+//!    that does not depend on the order in which unrelated effects were added.
+//! 3. `bind`: the kernels of what is left are compiled (or found compiled),
 //!    their reflection is held against the declaration, uniform blocks are
 //!    packed and workgroups counted.
-//! 3. `order`: passes are put in an order that respects every version, and
-//!    that does not depend on the order in which unrelated effects were added.
 //! 4. `lifetime`: when each resource is first and last used.
 //! 5. `alias`: transient resources that live at different times share memory.
 //! 6. `barrier`: what must be waited for and made visible before each pass.
+//!
+//! What was [decided](Graph::decide) of effects before is told with the rest: the
+//! plan has a reason for every effect, every pass that runs and every one that does
+//! not.
 //!
 //! The result is plain data: printable, comparable, serialisable to JSON, the
 //! same for the same input. A backend may not reorder, add or drop work.
@@ -23,10 +27,12 @@
 mod alias;
 mod barrier;
 mod bind;
+mod count;
 mod cull;
 mod error;
 mod explain;
 mod lifetime;
+mod memory;
 mod order;
 mod raster;
 #[cfg(test)]
@@ -38,12 +44,13 @@ use std::sync::Arc;
 use serde::{Serialize, Serializer};
 
 pub use error::PlanError;
+pub use memory::{MemoryAtStep, TransientMemory};
 pub use raster::{
     DrawExtent, DrawForm, PlannedAttribute, PlannedDraw, PlannedIndices, PlannedLayout,
     PlannedTarget, PlannedVertices, RasterStep,
 };
 
-use crate::graph::{ClearValue, Graph, ResourceDesc, Subresources};
+use crate::graph::{ClearValue, Decision, Graph, ResourceDesc, Subresources};
 use crate::kernel::{Arithmetic, Kernel, KernelLibrary};
 use crate::resource::{BufferDesc, Limits, SamplerDesc, TextureDesc};
 
@@ -479,8 +486,14 @@ pub enum Step {
 pub struct PlannedStep {
     /// The pass's name, unique in the plan.
     pub name: String,
+    /// The effect it belongs to: what its name has before the first slash; empty for
+    /// clears, copies and captures.
+    pub effect: String,
     /// Why it runs.
     pub reason: String,
+    /// The output or history for whose sake it runs, the first by name of several;
+    /// empty for captures.
+    pub goal: String,
     /// What must happen before it.
     pub barriers: Vec<Barrier>,
     /// What it does.
@@ -494,6 +507,19 @@ pub struct CulledPass {
     pub name: String,
     /// Why not.
     pub reason: String,
+}
+
+/// What became of an effect.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
+pub struct PlannedEffect {
+    /// What its passes' names begin with, or the name of a part of an effect.
+    pub name: String,
+    /// What was decided of it.
+    pub decision: Decision,
+    /// How many of its passes run.
+    pub passes: u32,
+    /// How many were declared and do not run.
+    pub culled: u32,
 }
 
 /// What to run, in what order, in which memory. See the [module documentation](self).
@@ -517,8 +543,11 @@ pub struct Plan {
     pub heap_alignment: u64,
     /// Bytes that transients would take if nothing were shared.
     pub unaliased_bytes: u64,
-    /// What does not run, and why.
+    /// What does not run, and why, by name.
     pub culled: Vec<CulledPass>,
+    /// What became of every effect, by name. Not part of the
+    /// [structure](Self::structure).
+    pub effects: Vec<PlannedEffect>,
     /// Contents of all uniform blocks. Not part of the [structure](Self::structure).
     pub uniforms: Vec<u8>,
 }
@@ -538,8 +567,8 @@ impl Plan {
         options: &PlanOptions<'_>,
     ) -> Result<Self, PlanError> {
         let live = cull::cull(graph)?;
-        let bound = bind::bind(graph, &live, kernels, options)?;
         let order = order::order(graph, &live)?;
+        let bound = bind::bind(graph, &live, &order, kernels, options)?;
         let steps = lifetime::steps(graph, &live, bound, &order, options.capture);
         let placed = alias::place(steps, options.memory)?;
         Ok(barrier::finish(placed, options.arithmetic))
@@ -576,35 +605,6 @@ impl Plan {
             .iter()
             .position(holds)
             .map(|index| index as u32)
-    }
-
-    /// Barriers of the whole plan.
-    #[must_use]
-    pub fn barrier_count(&self) -> usize {
-        self.steps
-            .iter()
-            .map(|step| step.barriers.len())
-            .sum::<usize>()
-            + self.final_barriers.len()
-    }
-
-    /// Steps that run a kernel.
-    #[must_use]
-    pub fn dispatch_count(&self) -> usize {
-        self.steps
-            .iter()
-            .filter(|step| matches!(step.step, Step::Dispatch { .. }))
-            .count()
-    }
-
-    /// Draws of all steps.
-    #[must_use]
-    pub fn draw_count(&self) -> usize {
-        let draws = self.steps.iter().map(|step| match &step.step {
-            Step::Raster(raster) => raster.draws.len(),
-            _ => 0,
-        });
-        draws.sum()
     }
 
     /// The plan as JSON, for other programs.

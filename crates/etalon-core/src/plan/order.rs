@@ -1,4 +1,4 @@
-//! Phase 3: an order that respects every version.
+//! Phase 2: an order that respects every version.
 //!
 //! Passes are visited depth first from the outputs in the order of the
 //! outputs' names, so the order follows from the shape of the graph alone:

@@ -194,10 +194,10 @@ impl CpuBackend {
                 };
                 let drawn = program.draw(&self.executor, &draw);
                 drawn.map_err(|error| failed(name, error))?;
-                count += 1;
             }
+            count += u64::from(!draw.extent.is_none());
         }
-        self.counters.dispatches += count;
+        self.counters.draws += count;
         Ok(())
     }
 }

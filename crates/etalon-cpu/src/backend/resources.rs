@@ -30,6 +30,7 @@ pub(super) struct Resources {
     textures: Vec<Texture>,
     buffers: Vec<Buffer>,
     locations: Vec<Location>,
+    transient_bytes: u64,
 }
 
 fn out_of_memory(name: &str, error: RunError) -> BackendError {
@@ -51,6 +52,11 @@ fn describe(desc: &TextureDesc, bytes: usize) -> String {
 }
 
 impl Resources {
+    /// Bytes behind the transients.
+    pub(super) const fn transient_bytes(&self) -> u64 {
+        self.transient_bytes
+    }
+
     /// Gives every resource of the plan a place, and imports their contents. If
     /// `watched`, each has a place of its own and counts as unwritten until
     /// something writes it.
@@ -128,6 +134,11 @@ impl Resources {
             };
             if let ResourceKind::Transient(place) = &resource.kind {
                 slots.insert(place.slot, location);
+                self.transient_bytes += match location {
+                    Location::Texture(index) => self.textures[index].bytes(),
+                    Location::Buffer(index) => self.buffers[index].held_bytes(),
+                    Location::History { .. } => 0,
+                };
             }
             self.locations.push(location);
         }

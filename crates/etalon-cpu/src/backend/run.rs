@@ -52,10 +52,13 @@ impl CpuBackend {
             .acquire(plan, &mut self.pool, watched)
             .map_err(|error| step_error("histories", error))?;
         let mut execution = Execution::default();
+        self.counters.transient_bytes = resources.transient_bytes();
         for step in &plan.steps {
             let start = Instant::now();
             self.counters.barriers += step.barriers.len() as u64;
             let captured = self.step(plan, &step.name, &step.step, resources)?;
+            self.counters.passes += u64::from(step.step.works());
+            self.counters.invocations += step.step.invocations().unwrap_or(0);
             match captured {
                 Some(captured) => {
                     execution.captures.push(captured);
@@ -258,14 +261,14 @@ impl CpuBackend {
         name: &str,
         kernel: &Kernel,
         bindings: &[Bound],
-        groups: &Groups,
+        planned: &Groups,
         resources: &Resources,
     ) -> Result<(), BackendError> {
         let program = self
             .programs
             .get(&kernel.id)
             .ok_or_else(|| malformed(name, "its kernel was not translated"))?;
-        let groups = match groups {
+        let groups = match planned {
             Groups::Direct(groups) => *groups,
             Groups::Indirect { buffer, offset } => {
                 let buffer = resources.buffer(name, *buffer)?;
@@ -301,7 +304,14 @@ impl CpuBackend {
                 found: report.sanitised,
             });
         }
-        self.counters.dispatches += 1;
+        self.counters.dispatches += u64::from(!planned.is_none());
+        if matches!(planned, Groups::Indirect { .. }) {
+            let size = kernel
+                .compute()
+                .map_or([0; 3], |stage| stage.workgroup_size);
+            let known = Groups::Direct(groups).invocations(size);
+            self.counters.indirect_invocations += known.unwrap_or(0);
+        }
         Ok(())
     }
 }

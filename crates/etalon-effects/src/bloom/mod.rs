@@ -10,6 +10,7 @@
 //! Warfare", SIGGRAPH 2014: the 13-tap filter down and the 3 × 3 tent up.
 //! B. Karis, "Tone mapping", 2013: the weighting against flicker.
 
+pub(crate) mod demand;
 pub mod truth;
 
 use etalon_core::Format;

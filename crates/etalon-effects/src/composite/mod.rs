@@ -1,5 +1,6 @@
 //! The last pass: exposure, bloom, tone curve and encoding in one kernel.
 
+pub(crate) mod demand;
 pub mod truth;
 
 use etalon_core::Format;

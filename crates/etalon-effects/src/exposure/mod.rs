@@ -12,6 +12,7 @@
 //! [`composite`]: crate::composite
 //! [`bloom`]: crate::bloom
 
+pub(crate) mod demand;
 pub mod truth;
 
 use etalon_core::Format;

@@ -14,6 +14,7 @@
 //! *Doom* (2016) and *Doom Eternal* (2020): a depth prepass in that order, with
 //! velocity for what moves.
 
+pub(crate) mod demand;
 mod item;
 mod view;
 

@@ -7,6 +7,7 @@
 //! The light map is `rgba16float`; every layer is rounded to it before it is added,
 //! and the sum once more by the target.
 
+pub(crate) mod demand;
 mod light;
 
 use etalon_core::Format;

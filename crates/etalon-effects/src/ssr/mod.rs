@@ -16,6 +16,7 @@
 //! reciprocal, an axis the ray does not cross is never divided by, and
 //! refinement keeps a bracket of one miss and one hit.
 
+pub(crate) mod demand;
 pub mod truth;
 
 use etalon_core::Format;

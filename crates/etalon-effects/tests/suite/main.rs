@@ -5,6 +5,7 @@ mod budget;
 mod checks;
 mod common;
 mod composite;
+mod demand;
 mod exposure;
 mod fast;
 mod forward_plan;

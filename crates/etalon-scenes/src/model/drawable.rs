@@ -233,7 +233,7 @@ impl Imported<'_> {
     }
 }
 
-fn is_blended(model: &Model, instance: &Instance) -> bool {
+pub(crate) fn is_blended(model: &Model, instance: &Instance) -> bool {
     let material = &model.parts().materials[instance.material];
     material.alpha == AlphaMode::Blend || material.transmission > 0.0
 }

@@ -44,6 +44,7 @@ mod texture;
 
 pub use animation::{Animation, Interpolation, Track, Values};
 pub use derive::{flat_normals, tangents};
+pub(crate) use drawable::is_blended;
 pub use drawable::{Drawable, Imported, lights, view};
 pub use error::{ModelError, Place};
 pub use etalon_effects::geometry::DrawClass;

@@ -5,6 +5,7 @@ use etalon_core::graph::{Graph, GraphError, Texture};
 use etalon_core::image::ImageError;
 use etalon_effects::environment::{Surroundings, mirroring};
 use etalon_effects::forward::{Lamps, Lighting, forward, glass, lamp_bytes};
+use etalon_effects::frame::{self, Drawables, Request, Shading};
 use etalon_effects::geometry::{GBuffer, Geometry, Prepass, gbuffer, prepass};
 use etalon_effects::lighting::{LightKind, PunctualLight, lighting};
 use etalon_effects::{EffectError, SceneInputs};
@@ -132,6 +133,12 @@ impl Shot {
         &self.camera
     }
 
+    /// What lights it: the model's own lights, or the one it is given for want of such.
+    #[must_use]
+    pub fn lights(&self) -> &[PunctualLight] {
+        &self.lights
+    }
+
     /// What a graph with the shot's passes is given.
     #[must_use]
     pub fn inputs(&self) -> Inputs<'_> {
@@ -207,6 +214,42 @@ impl Shot {
                 delta_time,
             },
         })
+    }
+}
+
+impl Shot {
+    /// Declares what a frame of it calls for, with everything that reads it: see
+    /// [`of_geometry`](etalon_effects::frame::of_geometry). For the request's demands
+    /// there is [`Shot::demands`].
+    ///
+    /// # Errors
+    /// If the camera has no projection for the size, or an effect or the graph
+    /// refuses the model.
+    pub fn frame(
+        &self,
+        graph: &mut Graph,
+        size: FrameSize,
+        surroundings: Surroundings,
+        shading: Shading,
+        delta_time: f32,
+        request: &Request,
+    ) -> Result<frame::Frame, ShotError> {
+        let imported = self.drawable.import(graph)?;
+        let opaque = imported.opaque_items(&self.model, &self.snapshot);
+        let eye = self.camera.pose().position();
+        let blended = imported.blended_items(&self.model, &self.snapshot, eye);
+        let drawables = Drawables {
+            opaque: &opaque,
+            blended: &blended,
+            view: view(&self.camera, size)?,
+            size: [size.width(), size.height()],
+            lights: &self.lights,
+            lamps: Lamps::import(graph, LAMPS, self.lights.len() as u32)?,
+            surroundings,
+            shading,
+            delta_time,
+        };
+        Ok(frame::of_geometry(graph, &drawables, request)?)
     }
 }
 

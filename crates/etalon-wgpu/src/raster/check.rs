@@ -15,7 +15,7 @@ use etalon_core::plan::{
 };
 use etalon_core::raster::{MAX_COLOUR_TARGETS, NumberKind, StepMode, TargetState, Topology};
 
-use super::{convert, does_nothing};
+use super::convert;
 use crate::check::Checker;
 
 /// Checks targets and draws.
@@ -322,7 +322,7 @@ impl Drawn<'_> {
         if !stride.is_multiple_of(4) || !offset.is_multiple_of(4) || tail > stride.into() {
             return Err(checker.malformed("its vertices are not aligned, or overlap"));
         }
-        if vertices.layout.attributes.is_empty() || does_nothing(&draw.extent) {
+        if vertices.layout.attributes.is_empty() || draw.extent.is_none() {
             return Ok(());
         }
         // The last element that is read for sure; those that indices or records
@@ -356,7 +356,7 @@ impl Drawn<'_> {
         if !indices.offset.is_multiple_of(size) {
             return Err(checker.malformed("its indices are not aligned"));
         }
-        if does_nothing(&draw.extent) {
+        if draw.extent.is_none() {
             return Ok(());
         }
         let count = match &draw.extent {

@@ -37,18 +37,6 @@ struct PreparedDraw {
     groups: PerPhysical<wgpu::BindGroup>,
 }
 
-/// Whether a draw draws nothing for sure.
-fn does_nothing(extent: &DrawExtent) -> bool {
-    match extent {
-        DrawExtent::Direct {
-            elements,
-            instances,
-            ..
-        } => elements.is_empty() || instances.is_empty(),
-        DrawExtent::Indirect { draws, .. } => *draws == 0,
-    }
-}
-
 /// Colour targets, then the depth target.
 fn targets(step: &RasterStep) -> impl Iterator<Item = &PlannedTarget> + Clone {
     step.colours.iter().chain(&step.depth)
@@ -97,7 +85,7 @@ impl Raster {
         self.views
             .select(key, || views(gpu, name, step, physicals))?;
         for (draw, prepared) in step.draws.iter().zip(&mut self.draws) {
-            if does_nothing(&draw.extent) {
+            if draw.extent.is_none() {
                 continue;
             }
             let layout = &prepared.pipeline.shaders.group;
@@ -163,7 +151,7 @@ impl Raster {
         pass.set_scissor_rect(part.x, part.y, part.width, part.height);
         let mut last: Option<&Arc<RenderPipeline>> = None;
         for (draw, prepared) in step.draws.iter().zip(&self.draws) {
-            if does_nothing(&draw.extent) {
+            if draw.extent.is_none() {
                 continue;
             }
             let pipeline = &prepared.pipeline;
@@ -174,7 +162,7 @@ impl Raster {
             pass.set_bind_group(0, prepared.groups.selected(), &[]);
             // What is not there has been refused when the plan was prepared.
             if context.draw(&mut pass, draw).is_some() {
-                context.gpu.tally.dispatches.add(1);
+                context.gpu.tally.draws.add(1);
             }
         }
     }

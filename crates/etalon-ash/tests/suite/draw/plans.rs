@@ -117,16 +117,10 @@ fn a_frame_like_an_earlier_one_makes_nothing() {
         let again = plan(backend, &mixed(2), Capture::Outputs);
         backend.execute(&again, &Inputs::new()).unwrap();
         let after = backend.counters();
-        let made = |counters: etalon_core::backend::Counters| {
-            (
-                [counters.kernels, counters.pipelines, counters.bind_groups],
-                [counters.textures, counters.buffers, counters.allocations],
-                counters.bytes,
-            )
-        };
-        assert_eq!(made(before), made(after));
-        let runs = again.dispatch_count() + again.draw_count();
-        assert_eq!(after.dispatches - before.dispatches, runs as u64);
+        assert_eq!(before.made(), after.made());
+        let done = after.since(&before);
+        assert_eq!(done.dispatches, again.dispatch_count() as u64);
+        assert_eq!(done.draws, again.draw_count() as u64);
         // A longer plan of the same draws makes no kernel and no pipeline.
         let longer = plan(backend, &mixed(3), Capture::Outputs);
         backend.execute(&longer, &Inputs::new()).unwrap();

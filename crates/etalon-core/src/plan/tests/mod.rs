@@ -2,6 +2,8 @@
 //! written independently of the phases.
 
 mod bind;
+mod count;
+mod independence;
 mod random;
 mod raster;
 mod shape;

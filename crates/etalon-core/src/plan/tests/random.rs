@@ -486,9 +486,43 @@ fn check(choices: &[u32], library: &KernelLibrary) -> (usize, usize) {
     assert_eq!(ran, case.needed, "exactly the needed passes run");
     assert_eq!(ran.len() + plan.culled.len(), case.graph.passes.len());
     check_barriers(&plan);
+    check_lives(&plan);
     let lower_bound = largest_set_alive(&plan);
-    assert!(plan.texture_heap >= lower_bound && plan.texture_heap <= plan.unaliased_bytes);
+    let memory = plan.transient_memory();
+    assert_eq!(memory.least, lower_bound);
+    assert_eq!(memory.planned, plan.texture_heap);
+    assert!(memory.planned >= lower_bound && memory.planned <= plan.unaliased_bytes);
+    let timeline = plan.memory_timeline();
+    let largest = timeline.iter().map(|at| at.alive).max().unwrap_or(0);
+    assert_eq!(largest, lower_bound);
     (ran.len(), plan.culled.len())
+}
+
+/// Checks from the list of steps alone that no two resources are in the same bytes at
+/// a time: what the plan says of when each lives is not believed.
+fn check_lives(plan: &Plan) {
+    let mut lives: HashMap<u32, (usize, usize)> = HashMap::new();
+    for ((resource, _), uses) in touches(plan) {
+        for touch in uses {
+            let life = lives.entry(resource).or_insert((touch.step, touch.step));
+            *life = (life.0.min(touch.step), life.1.max(touch.step));
+        }
+    }
+    let placed: Vec<_> = (0_u32..)
+        .zip(&plan.resources)
+        .filter_map(|(index, resource)| Some((resource.placement()?, *lives.get(&index)?)))
+        .collect();
+    for (number, (place, life)) in placed.iter().enumerate() {
+        for (other, lived) in &placed[..number] {
+            let apart = place.offset + place.bytes <= other.offset
+                || other.offset + other.bytes <= place.offset;
+            assert!(
+                apart || life.1 < lived.0 || lived.1 < life.0,
+                "two tenants of the bytes from {} on, in steps {life:?} and {lived:?}",
+                place.offset
+            );
+        }
+    }
 }
 
 /// Bytes of the transients alive at the busiest step.
@@ -583,8 +617,10 @@ fn planted_faults_are_caught() {
             place.offset = 0;
         }
     }
+    assert!(std::panic::catch_unwind(|| check_lives(&planted)).is_err());
     assert!(fails(planted));
-    assert!(!fails(plan));
+    assert!(!fails(plan.clone()));
+    check_lives(&plan);
 }
 
 #[test]

@@ -29,6 +29,7 @@ fn what_nothing_asks_for_is_culled_with_its_reason() {
     let plan = plan(&graph).unwrap();
     assert_eq!(names(&plan), ["wanted"]);
     assert_eq!(plan.steps[0].reason, "writes output `result`");
+    assert_eq!(plan.steps[0].goal, "result");
     let culled: Vec<_> = plan
         .culled
         .iter()
@@ -51,6 +52,89 @@ fn what_nothing_asks_for_is_culled_with_its_reason() {
         plan.resources
             .iter()
             .all(|resource| resource.name != "b" && resource.name != "c")
+    );
+}
+
+#[test]
+fn every_pass_tells_its_effect_and_for_which_output_it_runs() {
+    let mut graph = Graph::new();
+    let source = graph.import_texture("source", R32).unwrap();
+    let [a, b, c] = ["a", "b", "c"].map(|name| graph.texture(name, R32));
+    let a = write(&mut graph, "blur/first", &[source], a);
+    let b = write(&mut graph, "blur/second", &[a], b);
+    let c = write(&mut graph, "grade/only", &[b], c);
+    graph.output("picture", c).unwrap();
+    let plan = plan(&graph).unwrap();
+    let told: Vec<_> = plan
+        .steps
+        .iter()
+        .map(|step| [&step.effect, &step.reason, &step.goal].map(String::as_str))
+        .collect();
+    assert_eq!(
+        told,
+        [
+            ["blur", "`blur/second` reads what it writes", "picture"],
+            ["blur", "`grade/only` reads what it writes", "picture"],
+            ["grade", "writes output `picture`", "picture"],
+        ]
+    );
+    let text = plan.to_string();
+    assert!(
+        text.contains("`blur/second` reads what it writes, for `picture`"),
+        "{text}"
+    );
+}
+
+#[test]
+fn decisions_are_told_and_change_nothing_else() {
+    use crate::graph::Decision;
+    let build = |decided: bool| {
+        let mut graph = Graph::new();
+        let source = graph.import_texture("source", R32).unwrap();
+        let [a, b] = ["a", "b"].map(|name| graph.texture(name, R32));
+        let a = write(&mut graph, "blur/only", &[source], a);
+        write(&mut graph, "grain/only", &[source], b);
+        graph.output("picture", a).unwrap();
+        if decided {
+            graph.decide("ssr", Decision::absent("nothing mirrors"));
+            graph.decide("blur", Decision::runs("whatever"));
+            graph.decide("blur", Decision::runs("the picture is to be soft"));
+            graph.decide("blur/only", Decision::runs("it is all there is of it"));
+        }
+        plan(&graph).unwrap()
+    };
+    let (with, without) = (build(true), build(false));
+    let told: Vec<_> = with
+        .effects
+        .iter()
+        .map(|effect| {
+            let decision = effect.decision.to_string();
+            (effect.name.as_str(), decision, effect.passes, effect.culled)
+        })
+        .collect();
+    let undecided = "runs: its passes were declared, and nothing was decided of it";
+    assert_eq!(
+        told,
+        [
+            ("blur", "runs: the picture is to be soft".to_owned(), 1, 0),
+            (
+                "blur/only",
+                "runs: it is all there is of it".to_owned(),
+                1,
+                0
+            ),
+            ("grain", undecided.to_owned(), 0, 1),
+            ("ssr", "absent: nothing mirrors".to_owned(), 0, 0),
+        ]
+    );
+    assert!(with.to_string().contains("ssr absent: nothing mirrors"));
+    assert_eq!(with.structure(), without.structure());
+    assert_eq!(
+        Plan {
+            effects: without.effects.clone(),
+            ..with
+        },
+        without
     );
 }
 

@@ -19,6 +19,9 @@
 //! [`chain`](mod@chain) runs those that a frame asks for; [`registry`] knows
 //! all of them by name.
 //!
+//! [`tiles`] lets heavy kernels run only where the picture needs them
+//! (`shaders/tiles`).
+//!
 //! # Settings
 //! Settings are plain structs. Each field says what it does to the picture, its
 //! range, and its cost. A value outside of its range, NaN included, is a
@@ -51,6 +54,7 @@ pub mod quality;
 pub mod registry;
 mod scene;
 pub mod ssr;
+pub mod tiles;
 pub mod truth;
 
 pub use chain::{Chain, ChainSettings, chain};

@@ -1,6 +1,6 @@
 //! Phase 4: the steps in order, and when each resource is first and last used.
 
-use crate::graph::{Graph, Origin, Subresources};
+use crate::graph::{AccessKind, ClearValue, Graph, Origin, Pass, ResourceDesc, Subresources};
 use crate::plan::bind::{BoundPasses, Use};
 use crate::plan::cull::Live;
 use crate::plan::{
@@ -47,6 +47,9 @@ pub(crate) fn steps(
         };
         let pass = &graph.passes[index as usize];
         let reason = explain::reason(graph, need);
+        if capture == Capture::EveryPass {
+            clears(graph, pass, &mut steps);
+        }
         steps.push(OrderedStep {
             name: pass.name.clone(),
             reason,
@@ -95,6 +98,53 @@ pub(crate) fn steps(
         histories,
         culled: explain::culled(graph, live),
         uniforms,
+    }
+}
+
+/// Clears what a pass writes in part and nothing wrote before: what is left out would
+/// be captured as whatever the memory held.
+fn clears(graph: &Graph, pass: &Pass, steps: &mut Vec<OrderedStep>) {
+    let parts = pass
+        .accesses
+        .iter()
+        .filter(|access| access.kind == AccessKind::WritePart);
+    for access in parts {
+        let resource = &graph.resources[access.resource as usize];
+        let ResourceDesc::Texture(desc) = resource.desc else {
+            continue;
+        };
+        if resource.has_contents() {
+            continue;
+        }
+        let (_, layers) = resource.desc.subresources();
+        let writers = &resource.versions[access.version as usize];
+        let empty = access
+            .range
+            .indices(layers)
+            .filter(|&index| writers.get(index).is_some_and(Option::is_none));
+        for index in empty {
+            let range = Subresources {
+                mip: index as u32 / layers,
+                mips: 1,
+                layer: index as u32 % layers,
+                layers: 1,
+            };
+            steps.push(OrderedStep {
+                name: format!("clear {}/{}", pass.name, access.binding),
+                reason: "captures show what the pass leaves out".to_owned(),
+                step: Step::ClearTexture {
+                    resource: access.resource,
+                    range,
+                    value: ClearValue::zero(desc.format.sample_kind()),
+                },
+                uses: vec![Use {
+                    resource: access.resource,
+                    range,
+                    usage: Usage::CopyTarget,
+                    keeps: false,
+                }],
+            });
+        }
     }
 }
 
@@ -208,8 +258,7 @@ impl Numbering<'_> {
         let mut planned = Vec::with_capacity(used.len());
         for (index, history) in used.into_iter().enumerate() {
             let pair = &self.graph.histories[history as usize];
-            let crate::graph::ResourceDesc::Texture(desc) =
-                self.graph.resources[pair.previous as usize].desc
+            let ResourceDesc::Texture(desc) = self.graph.resources[pair.previous as usize].desc
             else {
                 continue;
             };
@@ -244,8 +293,8 @@ impl Numbering<'_> {
             let number = self.number(output.resource, steps.saturating_sub(1));
             let resource = &mut self.resources[number as usize];
             let rest = match resource.desc {
-                crate::graph::ResourceDesc::Texture(_) => Usage::Sampled,
-                crate::graph::ResourceDesc::Buffer(_) => Usage::StorageRead,
+                ResourceDesc::Texture(_) => Usage::Sampled,
+                ResourceDesc::Buffer(_) => Usage::StorageRead,
             };
             match &mut resource.kind {
                 ResourceKind::Output(names) => names.push(output.name.clone()),

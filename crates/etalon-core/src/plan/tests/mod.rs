@@ -2,6 +2,7 @@
 //! written independently of the phases.
 
 mod bind;
+mod part;
 mod random;
 mod raster;
 mod shape;

@@ -86,6 +86,7 @@ impl Stage {
     }
 
     /// The graph of an effect with some knobs set, its result as the output `result`.
+    /// Every pass runs on the whole picture unless a value says otherwise.
     ///
     /// # Errors
     /// If the effect refuses the scene or a value.
@@ -96,7 +97,9 @@ impl Stage {
     ) -> Result<Graph, EffectError> {
         let mut graph = Graph::new();
         let inputs = self.frame.import(&mut graph, DELTA_TIME)?;
-        let result = effect.build_with(&mut graph, &inputs, values)?;
+        let mut all: Vec<(&str, KnobValue)> = effect.everywhere();
+        all.extend_from_slice(values);
+        let result = effect.build_with(&mut graph, &inputs, &all)?;
         graph.output("result", result)?;
         Ok(graph)
     }

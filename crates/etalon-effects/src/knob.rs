@@ -126,6 +126,8 @@ pub enum Role {
     Accuracy,
     /// Asks for another picture, which is as right as the one before.
     Look,
+    /// Changes how much work it is, and no bit of the picture.
+    Cost,
 }
 
 /// One setting of the effect whose settings are `S`.

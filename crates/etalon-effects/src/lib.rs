@@ -20,6 +20,9 @@
 //! that what is on the screen calls for, as [`demand`] says it. [`registry`] knows all
 //! of them by name.
 //!
+//! [`tiles`] lets heavy kernels run only where the picture needs them
+//! (`shaders/tiles`).
+//!
 //! # Settings
 //! Settings are plain structs. Each field says what it does to the picture, its
 //! range, and its cost. A value outside of its range, NaN included, is a
@@ -54,6 +57,7 @@ pub mod quality;
 pub mod registry;
 mod scene;
 pub mod ssr;
+pub mod tiles;
 pub mod truth;
 
 pub use chain::{Chain, ChainSettings, chain};

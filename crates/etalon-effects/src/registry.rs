@@ -8,7 +8,7 @@ use crate::chain::{ChainSettings, chain};
 use crate::composite::{self, Composite, composite};
 use crate::demand::{Calls, Need};
 use crate::exposure::{self, Exposed, Exposure, exposure};
-use crate::knob::{KnobError, KnobInfo, KnobValue, Tunable, infos, tuned};
+use crate::knob::{KnobError, KnobInfo, KnobValue, Role, Tunable, infos, tuned};
 use crate::ssr::{self, Ssr, ssr};
 use crate::{EffectError, SceneInputs};
 
@@ -80,6 +80,17 @@ impl EffectEntry {
     #[must_use]
     pub fn knobs(&self) -> Vec<KnobInfo> {
         (self.knobs)()
+    }
+
+    /// Its knobs that change the cost alone, set so that every pass runs on the whole
+    /// picture: what it then takes does not depend on what the scene shows.
+    #[must_use]
+    pub fn everywhere(&self) -> Vec<(&'static str, KnobValue)> {
+        let knobs = self.knobs().into_iter();
+        let costs = knobs.filter(|knob| knob.role == Role::Cost);
+        costs
+            .filter_map(|knob| Some((knob.name, *knob.ladder.first()?)))
+            .collect()
     }
 
     /// Declares it with default settings and returns its result.

@@ -237,7 +237,7 @@ impl Subject {
         let mut graph = Graph::new();
         let inputs = frame.import(&mut graph, DELTA_TIME)?;
         let result = match self.origin {
-            Origin::Effect(entry) => entry.build(&mut graph, &inputs)?,
+            Origin::Effect(entry) => entry.build_with(&mut graph, &inputs, &entry.everywhere())?,
             Origin::Small(build) => build(&mut graph, &inputs)?,
         };
         graph.output("result", result)?;

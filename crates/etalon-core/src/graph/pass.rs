@@ -13,6 +13,8 @@ use crate::resource::SamplerDesc;
 pub(crate) enum AccessKind {
     Read,
     Write,
+    /// Some of it is written; the rest keeps what it held, if it held anything.
+    WritePart,
     Update,
     CopySource,
     CopyTarget,
@@ -32,6 +34,7 @@ impl AccessKind {
         matches!(
             self,
             Self::Read
+                | Self::WritePart
                 | Self::Update
                 | Self::CopySource
                 | Self::Indirect
@@ -45,7 +48,12 @@ impl AccessKind {
     pub(crate) const fn writes(self) -> bool {
         matches!(
             self,
-            Self::Write | Self::Update | Self::CopyTarget | Self::Target | Self::TargetKept
+            Self::Write
+                | Self::WritePart
+                | Self::Update
+                | Self::CopyTarget
+                | Self::Target
+                | Self::TargetKept
         )
     }
 }
@@ -276,7 +284,9 @@ pub(crate) fn check(
             first_layer: access.range.layer,
         }
     })?;
-    if access.kind.reads() && !resource.has_contents() {
+    // What is written in part may have held nothing so far.
+    let needed = access.kind.reads() && access.kind != AccessKind::WritePart;
+    if needed && !resource.has_contents() {
         let writers = &resource.versions[access.version as usize];
         if let Some(index) = range
             .indices(layers)
@@ -447,6 +457,20 @@ impl<'g> ComputePass<'g> {
     ) -> Self {
         self.accesses
             .push(texture(binding, target.into(), AccessKind::Write));
+        self
+    }
+
+    /// Writes some texels of a texture through the kernel's variable `binding`. The
+    /// others keep what earlier passes wrote there; where none did they hold nothing
+    /// that is defined, and whoever reads the texture must not look at them. Plans that
+    /// capture every pass clear such a texture first, so that captures can be compared.
+    pub fn write_part(
+        mut self,
+        binding: impl Into<Cow<'static, str>>,
+        target: impl Into<TextureView>,
+    ) -> Self {
+        self.accesses
+            .push(texture(binding, target.into(), AccessKind::WritePart));
         self
     }
 

@@ -544,9 +544,10 @@ impl Binder<'_> {
     ) -> Result<Usage, PlanError> {
         match (given, wanted) {
             (AccessKind::Read, kernel::Access::Read) => Ok(Usage::StorageRead),
-            (AccessKind::Write, kernel::Access::Write | kernel::Access::ReadWrite) => {
-                Ok(Usage::StorageWrite)
-            }
+            (
+                AccessKind::Write | AccessKind::WritePart,
+                kernel::Access::Write | kernel::Access::ReadWrite,
+            ) => Ok(Usage::StorageWrite),
             (AccessKind::Update, kernel::Access::ReadWrite) => Ok(Usage::StorageUpdate),
             (given, wanted) => Err(self.differs(
                 name,

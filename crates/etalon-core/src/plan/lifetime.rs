@@ -1,6 +1,6 @@
 //! Phase 4: the steps in order, and when each resource is first and last used.
 
-use crate::graph::{Graph, Origin, Subresources};
+use crate::graph::{AccessKind, ClearValue, Graph, Origin, Pass, ResourceDesc, Subresources};
 use crate::plan::bind::{BoundPasses, Use};
 use crate::plan::cull::{Live, by_name};
 use crate::plan::{
@@ -42,6 +42,10 @@ pub(crate) fn steps(
     let mut steps = Vec::with_capacity(order.len());
     for (&index, bound) in order.iter().zip(passes) {
         let pass = &graph.passes[index as usize];
+        if capture == Capture::EveryPass {
+            let goal = explain::goal(graph, live.goals[index as usize]);
+            clears(graph, pass, &goal, &mut steps);
+        }
         steps.push(OrderedStep {
             name: pass.name.clone(),
             effect: explain::effect_of(&pass.name).to_owned(),
@@ -94,6 +98,55 @@ pub(crate) fn steps(
         culled: explain::culled(graph, live),
         effects: explain::effects(graph, live),
         uniforms,
+    }
+}
+
+/// Clears what a pass writes in part and nothing wrote before: what is left out would
+/// be captured as whatever the memory held.
+fn clears(graph: &Graph, pass: &Pass, goal: &str, steps: &mut Vec<OrderedStep>) {
+    let parts = pass
+        .accesses
+        .iter()
+        .filter(|access| access.kind == AccessKind::WritePart);
+    for access in parts {
+        let resource = &graph.resources[access.resource as usize];
+        let ResourceDesc::Texture(desc) = resource.desc else {
+            continue;
+        };
+        if resource.has_contents() {
+            continue;
+        }
+        let (_, layers) = resource.desc.subresources();
+        let writers = &resource.versions[access.version as usize];
+        let empty = access
+            .range
+            .indices(layers)
+            .filter(|&index| writers.get(index).is_some_and(Option::is_none));
+        for index in empty {
+            let range = Subresources {
+                mip: index as u32 / layers,
+                mips: 1,
+                layer: index as u32 % layers,
+                layers: 1,
+            };
+            steps.push(OrderedStep {
+                name: format!("clear {}/{}", pass.name, access.binding),
+                effect: explain::effect_of(&pass.name).to_owned(),
+                goal: goal.to_owned(),
+                reason: "captures show what the pass leaves out".to_owned(),
+                step: Step::ClearTexture {
+                    resource: access.resource,
+                    range,
+                    value: ClearValue::zero(desc.format.sample_kind()),
+                },
+                uses: vec![Use {
+                    resource: access.resource,
+                    range,
+                    usage: Usage::CopyTarget,
+                    keeps: false,
+                }],
+            });
+        }
     }
 }
 
@@ -209,8 +262,7 @@ impl Numbering<'_> {
         let mut planned = Vec::with_capacity(used.len());
         for (index, history) in used.into_iter().enumerate() {
             let pair = &self.graph.histories[history as usize];
-            let crate::graph::ResourceDesc::Texture(desc) =
-                self.graph.resources[pair.previous as usize].desc
+            let ResourceDesc::Texture(desc) = self.graph.resources[pair.previous as usize].desc
             else {
                 continue;
             };
@@ -246,8 +298,8 @@ impl Numbering<'_> {
             let number = self.number(output.resource, steps.saturating_sub(1));
             let resource = &mut self.resources[number as usize];
             let rest = match resource.desc {
-                crate::graph::ResourceDesc::Texture(_) => Usage::Sampled,
-                crate::graph::ResourceDesc::Buffer(_) => Usage::StorageRead,
+                ResourceDesc::Texture(_) => Usage::Sampled,
+                ResourceDesc::Buffer(_) => Usage::StorageRead,
             };
             match &mut resource.kind {
                 ResourceKind::Output(names) => names.push(output.name.clone()),

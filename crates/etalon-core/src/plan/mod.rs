@@ -148,7 +148,7 @@ pub enum Usage {
     Sampled,
     /// Reads through a storage binding (`GENERAL`).
     StorageRead,
-    /// Writes through a storage binding that keeps nothing (`GENERAL`).
+    /// Writes through a storage binding that reads nothing (`GENERAL`).
     StorageWrite,
     /// Reads and writes through a storage binding (`GENERAL`).
     StorageUpdate,

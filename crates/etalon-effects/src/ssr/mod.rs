@@ -3,7 +3,8 @@
 //! The march stores *where* the reflection is, before any colour exists
 //! ([`march`]); colours are looked up there afterwards ([`resolve`]), blurred
 //! for rough surfaces ([`blur`]) and laid onto the scene by its specular map
-//! ([`mix`]). [`ssr`] does all four.
+//! ([`mix`]). [`ssr`] does all four, by default only on [tiles](crate::tiles) that show
+//! something mirrored.
 //!
 //! Only what the screen shows can be reflected: what lies outside of it, behind
 //! something, or faces away is not there to be found. The fades of [`Ssr`] let
@@ -17,16 +18,18 @@
 //! refinement keeps a bracket of one miss and one hit.
 
 pub(crate) mod demand;
+mod passes;
+mod tiled;
 pub mod truth;
 
 use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
-use etalon_core::resource::TextureDesc;
-use glam::IVec2;
 
-use crate::check::{Settings, same_size, size};
+pub use passes::{blur, march, mix, resolve};
+
 use crate::knob::{Tunable, choices, knobs};
-use crate::scene::CameraParams;
+use crate::tiles::Tiling;
+use crate::tiles::crossover::Cost;
 use crate::{EffectError, SceneInputs, SettingError};
 
 /// How the screen is searched along a ray.
@@ -129,6 +132,11 @@ pub struct Ssr {
     pub storage: HitStorage,
     /// How the reflection is put onto the scene.
     pub blend: Blend,
+    /// Into which tiles the picture is divided, of which those are left out that show
+    /// nothing mirrored. Changes no bit of the picture. It costs a look at the specular
+    /// map of each texel, and saves all but a copy on tiles where the map is 0; see
+    /// [`Ssr::for_coverage`].
+    pub tiles: Tiling,
 }
 
 knobs!(Ssr, "ssr" {
@@ -145,6 +153,7 @@ knobs!(Ssr, "ssr" {
     count blur_radius [0, 64] "texels", Look [0, 2, 6, 16], "reach of the blur on rough surfaces";
     choice storage [HitStorage] "", Accuracy ["rgba16float", "rgba32float"], "what places of reflections are stored in";
     choice blend [Blend] "", Look ["add", "replace"], "how the reflection is put onto the scene";
+    choice tiles [Tiling] "texels", Cost ["off", "8", "16", "32", "64"], "side of the tiles of which those that show nothing mirrored are left out";
 });
 
 impl Default for Ssr {
@@ -163,6 +172,7 @@ impl Default for Ssr {
             blur_radius: 6,
             storage: HitStorage::Full,
             blend: Blend::Add,
+            tiles: Tiling::Texels8,
         }
     }
 }
@@ -175,12 +185,20 @@ impl Ssr {
     pub fn validate(&self) -> Result<(), SettingError> {
         self.check_knobs()
     }
-}
 
-/// A texture the size of `like`, of another format.
-fn texture(graph: &mut Graph, name: &str, like: Texture, format: Format) -> Texture {
-    let extent = graph.desc(like).extent;
-    graph.texture(name, TextureDesc::d2(extent.width, extent.height, format))
+    /// These settings for a frame of which a share, in `[0, 1]`, mirrors: without tiles
+    /// from the share on where they take longer on a device than no tiles at all. The
+    /// picture is the same. [`MEASURED`](crate::tiles::crossover::MEASURED) stands for a
+    /// device that was not measured.
+    #[must_use]
+    pub fn for_coverage(self, coverage: f64, cost: &Cost) -> Self {
+        let tiles = if coverage >= cost.crossover() {
+            Tiling::Off
+        } else {
+            self.tiles
+        };
+        Self { tiles, ..self }
+    }
 }
 
 /// Adds reflections to `inputs.colour`; with a resolution of 0 returns it as it is.
@@ -198,6 +216,14 @@ pub fn ssr(
     if settings.resolution == 0.0 {
         return Ok(inputs.colour);
     }
+    match settings.tiles.size() {
+        Some(size) => tiled::ssr(graph, inputs, settings, size),
+        None => full(graph, inputs, settings),
+    }
+}
+
+/// Every pass on the whole picture.
+fn full(graph: &mut Graph, inputs: &SceneInputs, settings: &Ssr) -> Result<Texture, EffectError> {
     let reflection = march(graph, inputs.depth, inputs.normal, &inputs.camera, settings)?;
     let sharp = resolve(graph, reflection, inputs.colour)?;
     let blurred = if settings.blur_radius > 0 {
@@ -213,143 +239,4 @@ pub fn ssr(
         blurred,
         settings.blend,
     )
-}
-
-/// Finds what each pixel mirrors.
-///
-/// The result has the size of `depth` and the format of `settings.storage`: u and
-/// v of the place, its visibility in `[0, 1]`, and the length of the ray in view
-/// units; all 0 where nothing is mirrored.
-///
-/// # Errors
-/// If a setting is out of range, the resolution is 0, or the inputs differ in size.
-pub fn march(
-    graph: &mut Graph,
-    depth: Texture,
-    normal: Texture,
-    camera: &CameraParams,
-    settings: &Ssr,
-) -> Result<Texture, EffectError> {
-    settings.validate()?;
-    camera.validate()?;
-    // Steps as far apart as the largest picture is wide are no steps.
-    Settings("ssr").range("resolution", settings.resolution, 1.0 / 16_384.0, 1.0)?;
-    same_size(
-        "ssr",
-        ("depth", size(graph, depth)),
-        ("normal", size(graph, normal)),
-    )?;
-    let result = texture(graph, "ssr.reflection", depth, settings.storage.format());
-    let pass = graph
-        .compute("ssr/march")
-        .read("depth", depth)
-        .read("normal", normal)
-        .write("result", result)
-        .feature("half", settings.storage == HitStorage::Half);
-    let refinements = match settings.search {
-        Search::Linear => 0,
-        Search::Refined => settings.steps,
-    };
-    Ok(camera
-        .set(pass)
-        .set("max_distance", settings.max_distance)
-        .set("thickness", settings.thickness)
-        .set("stride", 1.0 / settings.resolution)
-        .set("max_steps", settings.march_limit)
-        .set("refinements", refinements)
-        .set("camera_fade", settings.camera_fade)
-        .set("depth_fade", settings.depth_fade)
-        .set("distance_fade", settings.distance_fade)
-        .set("border", settings.border)
-        .per_texel("result")?)
-}
-
-/// Looks up `colour` where [`march`] says the reflection is.
-///
-/// The result is `rgba16float` of the size of `reflection`: the colour times
-/// the visibility, and the visibility. `colour` may be of any size.
-///
-/// # Errors
-/// If the graph refuses a handle.
-pub fn resolve(
-    graph: &mut Graph,
-    reflection: Texture,
-    colour: Texture,
-) -> Result<Texture, EffectError> {
-    let result = texture(graph, "ssr.sharp", reflection, Format::Rgba16Float);
-    Ok(graph
-        .compute("ssr/resolve")
-        .read("reflection", reflection)
-        .read("source", colour)
-        .write("result", result)
-        .per_texel("result")?)
-}
-
-/// Box blur over `2 radius + 1` texels in each axis, in two passes.
-///
-/// The result is `rgba16float` of the size of `source`.
-///
-/// # Errors
-/// If the radius is over 64.
-pub fn blur(graph: &mut Graph, source: Texture, radius: u32) -> Result<Texture, EffectError> {
-    Settings("ssr").count("blur_radius", radius, 0, 64)?;
-    let mut newest = source;
-    for (name, axis) in [("x", IVec2::X), ("y", IVec2::Y)] {
-        let result = texture(
-            graph,
-            &format!("ssr.blurred {name}"),
-            source,
-            Format::Rgba16Float,
-        );
-        newest = graph
-            .compute("ssr/blur")
-            .named(format!("ssr/blur {name}"))
-            .read("source", newest)
-            .write("result", result)
-            .set("axis", axis)
-            .set("radius", radius as i32)
-            .per_texel("result")?;
-    }
-    Ok(newest)
-}
-
-/// Puts reflections onto the scene: of each colour what the specular map says,
-/// sharp where it is shiny and blurred where it is not.
-///
-/// Without `blurred` every surface shows the sharp reflection. The result is
-/// `rgba16float` of the size of `colour`.
-///
-/// # Errors
-/// If the inputs differ in size.
-pub fn mix(
-    graph: &mut Graph,
-    colour: Texture,
-    specular: Texture,
-    sharp: Texture,
-    blurred: Option<Texture>,
-    blend: Blend,
-) -> Result<Texture, EffectError> {
-    let picture = ("colour", size(graph, colour));
-    for (name, input) in [
-        ("specular", Some(specular)),
-        ("sharp", Some(sharp)),
-        ("blurred", blurred),
-    ] {
-        if let Some(input) = input {
-            same_size("ssr", picture, (name, size(graph, input)))?;
-        }
-    }
-    let result = texture(graph, "ssr.result", colour, Format::Rgba16Float);
-    let mut pass = graph
-        .compute("ssr/mix")
-        .read("source", colour)
-        .read("specular", specular)
-        .read("sharp", sharp)
-        .write("result", result)
-        .feature("blurred", blurred.is_some())
-        .constant("ADD", f64::from(u8::from(blend == Blend::Add)));
-    if let Some(blurred) = blurred {
-        pass = pass.read("blurred", blurred);
-    }
-    Ok(pass.per_texel("result")?)
 }

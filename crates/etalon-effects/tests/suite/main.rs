@@ -19,4 +19,5 @@ mod settings;
 mod ssr;
 mod ssr_colour;
 mod ssr_hard;
+mod tiles;
 mod truth;

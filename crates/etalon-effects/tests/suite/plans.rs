@@ -168,12 +168,23 @@ fn the_chain_runs_its_passes_in_order() {
     let result = chain(&mut graph, &inputs, &settings).expect("valid settings");
     graph.output("picture", result.picture).expect("written");
     let plan = plan(&graph, &kernels, Arithmetic::Strict);
+    // Each list of tiles is made right before it is needed.
     let expected = [
+        "ssr/classify",
+        "tiles/spread",
+        "tiles/spread",
+        "tiles/list",
         "ssr/march",
         "ssr/resolve",
+        "tiles/list",
         "ssr/blur",
+        "tiles/list",
         "ssr/blur",
         "ssr/mix",
+        "tiles/list",
+        "ssr/mix",
+        "tiles/list",
+        "ssr/keep",
         "exposure/luminance",
         "exposure/reduce",
         "exposure/adapt",

@@ -4,6 +4,7 @@
 mod bind;
 mod count;
 mod independence;
+mod part;
 mod random;
 mod raster;
 mod shape;

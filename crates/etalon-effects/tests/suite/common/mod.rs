@@ -11,6 +11,7 @@ use etalon_core::plan::{Capture, Plan, PlanOptions};
 use etalon_core::resource::TextureDesc;
 use etalon_effects::SceneInputs;
 use etalon_effects::ssr::{Blend, HitStorage, Search, Ssr};
+use etalon_effects::tiles::Tiling;
 use etalon_scenes::Frame;
 
 /// Reflections without fades and blur: visibility is 1 where there is a hit.
@@ -28,6 +29,7 @@ pub(crate) const PLAIN_SSR: Ssr = Ssr {
     blur_radius: 0,
     storage: HitStorage::Full,
     blend: Blend::Add,
+    tiles: Tiling::Off,
 };
 
 /// The executor of these tests.
@@ -98,6 +100,15 @@ impl<'a> Run<'a> {
         self.graph.output("result", result).expect("written");
         let execution = self.execute(backend, Capture::Outputs);
         execution.output("result").expect("captured").clone()
+    }
+
+    /// The plan of everything asked for, for no device in particular.
+    pub(crate) fn plan(&self) -> Plan {
+        let options = PlanOptions {
+            arithmetic: self.arithmetic,
+            ..PlanOptions::default()
+        };
+        Plan::new(&self.graph, &self.kernels, &options).unwrap_or_else(|error| panic!("{error}"))
     }
 
     /// Runs everything asked for.

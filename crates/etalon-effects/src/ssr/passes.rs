@@ -1,0 +1,222 @@
+//! The passes of screen-space reflection, each on the whole picture or on tiles of it.
+
+use etalon_core::Format;
+use etalon_core::graph::{Graph, Texture};
+use etalon_core::resource::TextureDesc;
+
+use super::{Blend, HitStorage, Search, Ssr};
+use crate::EffectError;
+use crate::check::{Settings, same_size, size};
+use crate::scene::CameraParams;
+use crate::tiles::{Area, Axis};
+
+/// A texture the size of `like`, of another format.
+fn texture(graph: &mut Graph, name: &str, like: Texture, format: Format) -> Texture {
+    let extent = graph.desc(like).extent;
+    graph.texture(name, TextureDesc::d2(extent.width, extent.height, format))
+}
+
+/// Finds what each pixel mirrors.
+///
+/// The result has the size of `depth` and the format of `settings.storage`: u and
+/// v of the place, its visibility in `[0, 1]`, and the length of the ray in view
+/// units; all 0 where nothing is mirrored.
+///
+/// # Errors
+/// If a setting is out of range, the resolution is 0, or the inputs differ in size.
+pub fn march(
+    graph: &mut Graph,
+    depth: Texture,
+    normal: Texture,
+    camera: &CameraParams,
+    settings: &Ssr,
+) -> Result<Texture, EffectError> {
+    march_on(graph, depth, normal, camera, settings, Area::Picture)
+}
+
+/// [`march`] where it is asked for.
+pub(super) fn march_on(
+    graph: &mut Graph,
+    depth: Texture,
+    normal: Texture,
+    camera: &CameraParams,
+    settings: &Ssr,
+    area: Area,
+) -> Result<Texture, EffectError> {
+    settings.validate()?;
+    camera.validate()?;
+    // Steps as far apart as the largest picture is wide are no steps.
+    Settings("ssr").range("resolution", settings.resolution, 1.0 / 16_384.0, 1.0)?;
+    same_size(
+        "ssr",
+        ("depth", size(graph, depth)),
+        ("normal", size(graph, normal)),
+    )?;
+    let result = texture(graph, "ssr.reflection", depth, settings.storage.format());
+    let pass = graph
+        .compute("ssr/march")
+        .read("depth", depth)
+        .read("normal", normal)
+        .feature("half", settings.storage == HitStorage::Half);
+    let refinements = match settings.search {
+        Search::Linear => 0,
+        Search::Refined => settings.steps,
+    };
+    let pass = camera
+        .set(pass)
+        .set("max_distance", settings.max_distance)
+        .set("thickness", settings.thickness)
+        .set("stride", 1.0 / settings.resolution)
+        .set("max_steps", settings.march_limit)
+        .set("refinements", refinements)
+        .set("camera_fade", settings.camera_fade)
+        .set("depth_fade", settings.depth_fade)
+        .set("distance_fade", settings.distance_fade)
+        .set("border", settings.border);
+    area.run(pass, result)
+}
+
+/// Looks up `colour` where [`march`] says the reflection is.
+///
+/// The result is `rgba16float` of the size of `reflection`: the colour times
+/// the visibility, and the visibility. `colour` may be of any size.
+///
+/// # Errors
+/// If the graph refuses a handle.
+pub fn resolve(
+    graph: &mut Graph,
+    reflection: Texture,
+    colour: Texture,
+) -> Result<Texture, EffectError> {
+    resolve_on(graph, reflection, colour, Area::Picture)
+}
+
+/// [`resolve`] where it is asked for.
+pub(super) fn resolve_on(
+    graph: &mut Graph,
+    reflection: Texture,
+    colour: Texture,
+    area: Area,
+) -> Result<Texture, EffectError> {
+    let result = texture(graph, "ssr.sharp", reflection, Format::Rgba16Float);
+    let pass = graph
+        .compute("ssr/resolve")
+        .read("reflection", reflection)
+        .read("source", colour);
+    area.run(pass, result)
+}
+
+/// Box blur over `2 radius + 1` texels in each axis, in two passes.
+///
+/// The result is `rgba16float` of the size of `source`.
+///
+/// # Errors
+/// If the radius is over 64.
+pub fn blur(graph: &mut Graph, source: Texture, radius: u32) -> Result<Texture, EffectError> {
+    let across = blur_along(graph, source, radius, Axis::X, Area::Picture)?;
+    blur_along(graph, across, radius, Axis::Y, Area::Picture)
+}
+
+/// One of the passes of [`blur`], where it is asked for.
+pub(super) fn blur_along(
+    graph: &mut Graph,
+    source: Texture,
+    radius: u32,
+    axis: Axis,
+    area: Area,
+) -> Result<Texture, EffectError> {
+    Settings("ssr").count("blur_radius", radius, 0, 64)?;
+    let name = match axis {
+        Axis::X => "x",
+        Axis::Y => "y",
+    };
+    let result = format!("ssr.blurred {name}");
+    let result = texture(graph, &result, source, Format::Rgba16Float);
+    let pass = graph
+        .compute("ssr/blur")
+        .named(format!("ssr/blur {name}"))
+        .read("source", source)
+        .set("axis", axis.step())
+        .set("radius", radius as i32);
+    area.run(pass, result)
+}
+
+/// Puts reflections onto the scene: of each colour what the specular map says,
+/// sharp where it is shiny and blurred where it is not.
+///
+/// Without `blurred` every surface shows the sharp reflection. The result is
+/// `rgba16float` of the size of `colour`.
+///
+/// # Errors
+/// If the inputs differ in size.
+pub fn mix(
+    graph: &mut Graph,
+    colour: Texture,
+    specular: Texture,
+    sharp: Texture,
+    blurred: Option<Texture>,
+    blend: Blend,
+) -> Result<Texture, EffectError> {
+    let layers = Layers {
+        colour,
+        specular,
+        sharp,
+        blurred,
+    };
+    let result = layers.result(graph)?;
+    layers.mix(graph, blend, result, Area::Picture, "ssr/mix")
+}
+
+/// What [`mix`] puts together.
+#[derive(Clone, Copy)]
+pub(super) struct Layers {
+    pub(super) colour: Texture,
+    pub(super) specular: Texture,
+    pub(super) sharp: Texture,
+    pub(super) blurred: Option<Texture>,
+}
+
+impl Layers {
+    /// A texture for the result, if the layers fit onto each other.
+    pub(super) fn result(&self, graph: &mut Graph) -> Result<Texture, EffectError> {
+        let picture = ("colour", size(graph, self.colour));
+        for (name, input) in [
+            ("specular", Some(self.specular)),
+            ("sharp", Some(self.sharp)),
+            ("blurred", self.blurred),
+        ] {
+            if let Some(input) = input {
+                same_size("ssr", picture, (name, size(graph, input)))?;
+            }
+        }
+        Ok(texture(
+            graph,
+            "ssr.result",
+            self.colour,
+            Format::Rgba16Float,
+        ))
+    }
+
+    /// [`mix`] where it is asked for, in a pass of some name.
+    pub(super) fn mix(
+        &self,
+        graph: &mut Graph,
+        blend: Blend,
+        result: Texture,
+        area: Area,
+        name: &str,
+    ) -> Result<Texture, EffectError> {
+        let mut pass = graph
+            .compute("ssr/mix")
+            .named(name)
+            .read("source", self.colour)
+            .read("specular", self.specular)
+            .read("sharp", self.sharp)
+            .feature("blurred", self.blurred.is_some())
+            .constant("ADD", f64::from(u8::from(blend == Blend::Add)));
+        if let Some(blurred) = self.blurred {
+            pass = pass.read("blurred", blurred);
+        }
+        area.run(pass, result)
+    }
+}

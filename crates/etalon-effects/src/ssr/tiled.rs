@@ -1,0 +1,89 @@
+//! Screen-space reflection on tiles that show something mirrored.
+//!
+//! What a tile's surfaces ask for decides what runs there: rough ones everything, smooth
+//! ones no blur, and where nothing is mirrored light is only copied. The blur looks at
+//! neighbours, so what comes before it also runs around the rough tiles.
+
+use etalon_core::graph::{Graph, Texture};
+
+use super::Ssr;
+use super::passes::{Layers, blur_along, march_on, resolve_on};
+use crate::tiles::{Area, Axis, Marks, TileSize};
+use crate::{EffectError, SceneInputs};
+
+/// Smooth surfaces are mirrored by, and no rough ones: as `ssr/classify` marks them.
+const SMOOTH: u32 = 1;
+/// Rough surfaces are mirrored by.
+const ROUGH: u32 = 2;
+/// The blur along columns reads what the blur along rows writes here.
+const BLURRED: u32 = 4;
+/// The blur along rows reads reflections here.
+const REFLECTED: u32 = 8;
+
+/// As [`super::ssr`], whose picture it gives bit for bit.
+pub(super) fn ssr(
+    graph: &mut Graph,
+    inputs: &SceneInputs,
+    settings: &Ssr,
+    tiles: TileSize,
+) -> Result<Texture, EffectError> {
+    let radius = settings.blur_radius;
+    let mut marks = classify(graph, inputs.specular, radius > 0, tiles)?;
+    if radius > 0 {
+        marks = marks
+            .spread(graph, Axis::Y, radius, ROUGH, BLURRED)?
+            .spread(graph, Axis::X, radius, BLURRED, REFLECTED)?;
+    }
+
+    let found = Area::Tiles(marks.with(graph, SMOOTH | REFLECTED)?);
+    let reflection = march_on(
+        graph,
+        inputs.depth,
+        inputs.normal,
+        &inputs.camera,
+        settings,
+        found,
+    )?;
+    let sharp = resolve_on(graph, reflection, inputs.colour, found)?;
+
+    let layers = Layers {
+        colour: inputs.colour,
+        specular: inputs.specular,
+        sharp,
+        blurred: None,
+    };
+    let mut result = layers.result(graph)?;
+    if radius > 0 {
+        let around = Area::Tiles(marks.with(graph, BLURRED)?);
+        let rough = Area::Tiles(marks.with(graph, ROUGH)?);
+        let across = blur_along(graph, sharp, radius, Axis::X, around)?;
+        let blurred = blur_along(graph, across, radius, Axis::Y, rough)?;
+        let layers = Layers {
+            blurred: Some(blurred),
+            ..layers
+        };
+        result = layers.mix(graph, settings.blend, result, rough, "ssr/mix")?;
+    }
+    let smooth = Area::Tiles(marks.with(graph, SMOOTH)?);
+    result = layers.mix(graph, settings.blend, result, smooth, "ssr/mix smooth")?;
+    let others = Area::Tiles(marks.without(graph, SMOOTH | ROUGH)?);
+    let pass = graph.compute("ssr/keep").read("source", inputs.colour);
+    others.run(pass, result)
+}
+
+/// What each tile asks for.
+fn classify(
+    graph: &mut Graph,
+    specular: Texture,
+    blurred: bool,
+    tiles: TileSize,
+) -> Result<Marks, EffectError> {
+    let marks = Marks::texture(graph, "ssr.marks", specular);
+    let marks = graph
+        .compute("ssr/classify")
+        .read("specular", specular)
+        .write("result", marks)
+        .feature("blurred", blurred)
+        .per_texel("result")?;
+    Marks::of(graph, marks, tiles)
+}

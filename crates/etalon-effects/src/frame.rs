@@ -84,11 +84,16 @@ impl Request {
         for (effect, decision) in self.decisions() {
             graph.decide(effect, decision);
         }
-        if let (Some(asked), Some(suited)) = (self.settings.ssr, self.called_for().ssr)
-            && suited.blur_radius < asked.blur_radius
-        {
+        let (Some(asked), Some(suited)) = (self.settings.ssr, self.called_for().ssr) else {
+            return;
+        };
+        if suited.blur_radius < asked.blur_radius {
             let reason = "all that mirrors is perfectly smooth";
             graph.decide("ssr/blur", Decision::absent(reason));
+        }
+        if suited.tiles != asked.tiles {
+            let reason = "so much of the screen mirrors that tiles would cost more than they save";
+            graph.decide("ssr/classify", Decision::absent(reason));
         }
     }
 
@@ -105,7 +110,7 @@ impl Request {
             ssr: settings
                 .ssr
                 .filter(|_| runs("ssr"))
-                .map(|settings| ssr::demand::suited(&settings, &self.demands)),
+                .map(|settings| ssr::demand::suited(&settings, &self.demands, &self.thresholds)),
             exposure: settings.exposure.filter(|_| runs("exposure")),
             bloom: settings.bloom.filter(|_| runs("bloom")),
             composite: settings.composite,

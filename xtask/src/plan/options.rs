@@ -195,6 +195,7 @@ impl Options {
         Thresholds {
             max_roughness: self.max_roughness,
             min_specular: self.min_specular,
+            ..Thresholds::default()
         }
     }
 }

@@ -24,6 +24,7 @@ pub use region::Region;
 pub(crate) use region::either;
 
 use crate::check::Settings;
+use crate::tiles::crossover::Cost;
 use crate::{ChainSettings, SettingError};
 
 /// Surfaces that mirror.
@@ -256,6 +257,12 @@ pub struct Thresholds {
     /// Share of a colour up to which mirroring is not worth it, in `[0, 1]`; 0 leaves
     /// out only what does not mirror.
     pub min_specular: f32,
+    /// What reflections take on the device, on tiles and without, as `cargo xtask
+    /// economy` measures it: where what mirrors covers more of the screen than tiles
+    /// are worth, they are off. For bounds that are tight; `None` leaves it to
+    /// [`Ssr::tiles`](crate::ssr::Ssr::tiles), as loose bounds say nothing of how much
+    /// there is.
+    pub tiles: Option<Cost>,
 }
 
 impl Default for Thresholds {
@@ -263,6 +270,7 @@ impl Default for Thresholds {
         Self {
             max_roughness: 1.0,
             min_specular: 0.0,
+            tiles: None,
         }
     }
 }

@@ -3,7 +3,7 @@
 use etalon_core::graph::Decision;
 
 use super::{Blend, Ssr};
-use crate::demand::{Calls, Demands, Need, off, unseen};
+use crate::demand::{Calls, Demands, Need, Thresholds, off, unseen};
 
 /// What the march and the mix read.
 pub(crate) const NEEDS: &[Need] = &[Need::Depth, Need::Normal, Need::Specular];
@@ -43,14 +43,20 @@ pub(crate) fn decide(calls: &Calls<'_>) -> Decision {
 }
 
 /// The settings without what nothing on screen calls for: where all that mirrors is
-/// perfectly smooth, the blur has no share in the mix.
-pub(crate) fn suited(settings: &Ssr, demands: &Demands) -> Ssr {
-    let rough = demands
-        .reflective
-        .is_some_and(|reflective| reflective.roughness[1] > 0.0);
-    Ssr {
+/// perfectly smooth, the blur has no share in the mix; and where most of the screen
+/// mirrors, tiles save less than they cost.
+pub(crate) fn suited(settings: &Ssr, demands: &Demands, thresholds: &Thresholds) -> Ssr {
+    let Some(reflective) = demands.reflective else {
+        return *settings;
+    };
+    let rough = reflective.roughness[1] > 0.0;
+    let suited = Ssr {
         blur_radius: if rough { settings.blur_radius } else { 0 },
         ..*settings
+    };
+    match &thresholds.tiles {
+        Some(cost) => suited.for_coverage(reflective.region.coverage().into(), cost),
+        None => suited,
     }
 }
 

@@ -11,6 +11,8 @@ use etalon_effects::demand::{Bright, Demands, Moving, Outputs, Reflective, Regio
 use etalon_effects::exposure::Exposure;
 use etalon_effects::frame::{Request, of_images};
 use etalon_effects::ssr::{Blend, Ssr};
+use etalon_effects::tiles::Tiling;
+use etalon_effects::tiles::crossover::Cost;
 use etalon_effects::{
     CameraParams, ChainSettings, EffectError, Quality, SceneInputs, SettingError, chain, effects,
 };
@@ -112,6 +114,30 @@ fn reflections_run_only_where_something_mirrors_that_is_smooth_enough() {
         decided(&request, "ssr").reason(),
         "the settings have it off"
     );
+}
+
+#[test]
+fn tiles_are_off_where_so_much_mirrors_that_they_are_not_worth_it() {
+    let tiles = |lower: [f32; 2], cost: Option<Cost>| {
+        let mut request = Request::default();
+        request.demands.reflective = Some(Reflective {
+            region: Region::new([0.0, 0.0], lower).expect("a region"),
+            ..REFLECTIVE
+        });
+        request.thresholds.tiles = cost;
+        request.called_for().ssr.map(|ssr| ssr.tiles)
+    };
+    // They are worth it up to three quarters of the screen.
+    let cost = Cost {
+        idle: 0.25,
+        slope: 1.0,
+        whole: 1.0,
+    };
+    let usual = Some(Ssr::default().tiles);
+    assert_eq!(tiles([1.0, 0.7], Some(cost)), usual);
+    assert_eq!(tiles([1.0, 0.8], Some(cost)), Some(Tiling::Off));
+    // Of bounds that may be loose nothing follows.
+    assert_eq!(tiles([1.0, 1.0], None), usual);
 }
 
 /// With a knee of a half and a threshold of 1 bloom begins at 0.5.

@@ -180,10 +180,6 @@ pub fn compare(reference: &ImageData, subject: &ImageData) -> Result<Comparison,
 /// One channel of one texel in which two images differ.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
-    /// The texel's number, in storage order.
-    pub texel: usize,
-    /// The channel.
-    pub channel: usize,
     /// The distance, above 0.
     pub ulps: Ulps,
     /// The reference's decoded value.
@@ -204,6 +200,15 @@ impl Difference {
     }
 }
 
+/// A channel of a texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Channel {
+    /// The texel's number, in storage order.
+    pub texel: usize,
+    /// The channel's.
+    pub channel: usize,
+}
+
 /// Counts the texels for which `condition` holds in any channel that differs.
 ///
 /// # Errors
@@ -211,7 +216,7 @@ impl Difference {
 pub fn texels_with(
     reference: &ImageData,
     subject: &ImageData,
-    condition: impl Fn(&Difference) -> bool,
+    condition: impl Fn(Channel, &Difference) -> bool,
 ) -> Result<u64, CompareError> {
     check(reference, subject)?;
     let format = reference.desc.format;
@@ -231,13 +236,11 @@ pub fn texels_with(
         let holds = |channel: usize| {
             let ulps = Ulps(distances[channel]);
             let difference = Difference {
-                texel,
-                channel,
                 ulps,
                 reference: values.0[channel],
                 subject: values.1[channel],
             };
-            ulps > Ulps(0) && condition(&difference)
+            ulps > Ulps(0) && condition(Channel { texel, channel }, &difference)
         };
         count += u64::from((0..format.channels() as usize).any(holds));
     });

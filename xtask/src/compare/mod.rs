@@ -13,7 +13,7 @@ mod tolerance;
 mod view;
 
 pub use figures::{
-    CompareError, Comparison, Difference, Ulps, WorstTexel, compare, describe, texels_with,
+    Channel, CompareError, Comparison, Difference, Ulps, WorstTexel, compare, describe, texels_with,
 };
 pub use flip::{Flip, flip};
 pub use tolerance::{Limit, Tolerance, Verdict};

@@ -294,7 +294,7 @@ fn outliers_are_counted_against_their_share() {
     let (_, verdict) = judge(&limit().with_outliers(share * 0.9), &reference, &subject);
     assert!(matches!(verdict, Verdict::Fail(why) if why.starts_with("3 texels (0.098 %) not")));
     assert_eq!(
-        texels_with(&reference, &subject, |difference| difference.absolute()
+        texels_with(&reference, &subject, |_, difference| difference.absolute()
             > 0.5),
         Ok(3)
     );
@@ -457,4 +457,33 @@ fn tolerances_say_what_and_why() {
     assert_eq!(json["kind"], "within");
     assert_eq!(json["limit"]["ulps"], 2);
     assert_eq!(json["reason"], "two roundings");
+}
+
+#[test]
+fn a_spread_allows_each_texel_its_own_difference() {
+    let desc = TextureDesc::d2(3, 1, Format::R32Float);
+    let image = |values: [f32; 3]| {
+        ImageData::from_rgba_f32(desc, &values.map(|value| [value, 0.0, 0.0, 1.0])).unwrap()
+    };
+    let reference = image([1.0, 1.0, 1.0]);
+    let judged = |decided, values| {
+        let tolerance = Tolerance::Spread {
+            allowed: [[0.5, 0.0, 0.0, 0.0], [0.0; 4], [0.25, 0.0, 0.0, 0.0]].into(),
+            decided,
+        };
+        judge(&tolerance, &reference, &image(values)).1.passed()
+    };
+    assert!(judged(0, [1.5, 1.0, 0.75]));
+    assert!(!judged(0, [1.5, 1.0, 0.5]));
+    assert!(!judged(0, [1.0, 1.000_001, 1.0]));
+    // As many may be anything as were decided otherwise, but no more.
+    assert!(judged(1, [1.5, 7.0, 0.75]));
+    assert!(!judged(1, [3.0, 7.0, 0.75]));
+    assert!(!judged(3, [f32::NAN, 1.0, 1.0]));
+    let spread = Tolerance::Spread {
+        allowed: [[0.0; 4]; 3].into(),
+        decided: 2,
+    };
+    assert_eq!(spread.summary(), "≤ spread but for 2");
+    assert!(spread.reason().contains("eight executions"));
 }

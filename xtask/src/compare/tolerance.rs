@@ -6,7 +6,7 @@ use std::sync::Arc;
 use etalon_core::image::ImageData;
 use serde::Serialize;
 
-use super::figures::{CompareError, Comparison, Difference, Ulps, texels_with};
+use super::figures::{Channel, CompareError, Comparison, Difference, Ulps, texels_with};
 
 /// How far an image may be from its reference.
 ///
@@ -151,16 +151,16 @@ impl Tolerance {
                 limit, outliers, ..
             } => (*limit, (outliers * comparison.texels as f64) as u64),
         };
-        let own = |difference: &Difference| match self {
+        let own = |Channel { texel, channel }: Channel| match self {
             Self::Spread { allowed, .. } => {
-                let texel = allowed.get(difference.texel).copied().unwrap_or_default();
-                Limit::Absolute(texel[difference.channel].into())
+                let texel = allowed.get(texel).copied().unwrap_or_default();
+                Limit::Absolute(texel[channel].into())
             }
             _ => limit,
         };
-        let within = |difference: &Difference| {
+        let within = |at: Channel, difference: &Difference| {
             difference.ulps != Ulps::INFINITE
-                && match own(difference) {
+                && match own(at) {
                     Limit::Ulps(max) => difference.ulps <= Ulps(max),
                     Limit::Absolute(max) => difference.absolute() <= max,
                     Limit::Relative { relative, absolute } => {
@@ -176,7 +176,7 @@ impl Tolerance {
                 "a NaN or infinity is in one image only".to_owned(),
             ));
         }
-        let beyond = texels_with(reference, subject, |difference| !within(difference))?;
+        let beyond = texels_with(reference, subject, |at, difference| !within(at, difference))?;
         let share = beyond as f64 / comparison.texels.max(1) as f64;
         if beyond <= outliers {
             return Ok(Verdict::Pass);

@@ -386,16 +386,16 @@ impl Parts {
             }
         }
         // Where nothing is lit there is no forward pass to write beside.
-        let (gbuffer, thin) = if deferred || !forward {
-            if lighting {
-                readers.push("lighting");
-            }
-            (readers.as_slice(), &[][..])
-        } else {
-            (&[][..], readers.as_slice())
+        let (gbuffer, thin) = match forward {
+            true => (Some("forward/thin"), None),
+            false => (None, Some("geometry/gbuffer")),
         };
-        let gbuffer = decide("geometry/gbuffer", geometry::demand::surfaces(gbuffer));
-        let thin = decide("forward/thin", geometry::demand::surfaces(thin));
+        if lighting {
+            readers.push("lighting");
+        }
+        let surfaces = |other| geometry::demand::surfaces(&readers, other);
+        let gbuffer = decide("geometry/gbuffer", surfaces(gbuffer));
+        let thin = decide("forward/thin", surfaces(thin));
         let glass = decide("forward/glass", forward_module::demand::glass(&calls));
         Self {
             prepass,

@@ -173,6 +173,7 @@ mod tests {
             threads: 0,
             validate: true,
             checks: true,
+            spread: true,
             plant: None,
             out,
         };

@@ -30,10 +30,12 @@ pub(crate) fn velocity(calls: &Calls<'_>) -> Decision {
     }
 }
 
-/// The G-buffer, and the thin one of forward shading: someone who reads it.
-pub(crate) fn surfaces(readers: &[&str]) -> Decision {
-    match readers {
-        [] => Decision::absent("nobody reads normals or what is mirrored"),
-        readers => Decision::runs(format!("read by {}", readers.join(", "))),
+/// The G-buffer, or the thin one of forward shading: someone who reads it, where it is
+/// not the other one that is read.
+pub(crate) fn surfaces(readers: &[&str], other: Option<&str>) -> Decision {
+    match (readers, other) {
+        ([], _) => Decision::absent("nobody reads normals or what is mirrored"),
+        (_, Some(other)) => Decision::absent(format!("`{other}` writes what is read of it")),
+        (readers, None) => Decision::runs(format!("read by {}", readers.join(", "))),
     }
 }

@@ -187,6 +187,12 @@ fn bloom_runs_only_where_exposed_light_can_pass_its_threshold() {
     );
 }
 
+fn everything_but(change: impl FnOnce(&mut Demands)) -> Demands {
+    let mut demands = Demands::everything();
+    change(&mut demands);
+    demands
+}
+
 /// What is decided is what is planned: with each demand taken away the plan is that of
 /// the chain with the effect off, in every step, byte and kernel.
 #[test]
@@ -194,17 +200,11 @@ fn an_absent_effect_is_not_in_the_plan() {
     let full = ChainSettings::full();
     for (without, settings) in [
         (
-            Demands {
-                reflective: None,
-                ..Demands::everything()
-            },
+            everything_but(|demands| demands.reflective = None),
             ChainSettings { ssr: None, ..full },
         ),
         (
-            Demands {
-                bright: None,
-                ..Demands::everything()
-            },
+            everything_but(|demands| demands.bright = None),
             ChainSettings {
                 bloom: None,
                 ..full
@@ -275,12 +275,10 @@ fn only_what_is_asked_for_is_output() {
     let kernels = KernelLibrary::new();
     let mut graph = Graph::new();
     let images = inputs(&mut graph, 64, 48);
+    let mut outputs = Outputs::NONE;
+    (outputs.light, outputs.velocity) = (true, true);
     let request = Request {
-        outputs: Outputs {
-            light: true,
-            velocity: true,
-            ..Outputs::NONE
-        },
+        outputs,
         ..Request::default()
     };
     let frame = of_images(&mut graph, &images, &request).expect("valid");

@@ -54,6 +54,21 @@ fn long(size: (u32, u32), out: DVec3) -> Result<Vec<Step>, CaseError> {
 
 pub(super) const CASES: &[Case] = &[
     Case::new(
+        "ray-back-to-a-near-plane-at-the-eye",
+        "cut at a near plane 10⁸ times nearer than its start, a ray ends there or, by a rounding, at the eye, where \
+         nothing is projected",
+        "M. McGuire and M. Mara, Efficient GPU Screen-Space Ray Tracing, 2014 (clipping at the near plane)",
+        || {
+            Canvas::small()
+                .camera(|camera| camera.near = 1e-6)
+                .paint(|spot| {
+                    framed_spot(spot, |spot| spot.mirror(100.0, DVec3::new(0.2, 0.1, 1.0)))
+                })
+        },
+    )
+    .on(&["ssr"])
+    .with(&[("max_distance", Real(1000.0))]),
+    Case::new(
         "ray-parallel-to-view-plane",
         "dir.z is 0: a sign of it is 0, the step becomes zero and length(0) divides",
         "Blender EEVEE raytrace_lib.glsl (z_sign); eevee_ray_trace_screen_lib.glsl",

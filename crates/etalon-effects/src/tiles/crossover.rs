@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 /// What an effect takes on a device, in any one unit of time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
     /// On tiles, where it concerns nothing.
     pub idle: f64,

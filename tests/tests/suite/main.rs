@@ -17,3 +17,4 @@ mod operations;
 mod position;
 mod programs;
 mod shading;
+mod tiles;

@@ -1,8 +1,8 @@
 //! From which share of the screen on tiles cost more than they save.
 //!
 //! The time of an effect on tiles is nearly a line, `idle + slope · coverage`, over the
-//! share of the screen that it concerns; without tiles it is the same whatever the
-//! share. `cargo xtask economy --crossover FILE` measures both on a device.
+//! share of the screen that its heavy tiles cover; without tiles it is the same whatever
+//! the share. `cargo xtask economy --crossover FILE` measures both on a device.
 
 use serde::{Deserialize, Serialize};
 

@@ -12,7 +12,7 @@ mod forward_plan;
 mod geometry_plan;
 mod hard_inputs;
 mod knobs;
-mod lib;
+mod library;
 mod metamorphic;
 mod plans;
 mod settings;

@@ -269,12 +269,12 @@ mod tests {
     fn the_work_is_what_doing_it_twice_adds() {
         let names: Vec<String> = ["a", "b", "c"].map(str::to_owned).into();
         let counted = [
-            7, 200_010, 3, 400_010, 9, 50_000, 2, 50_015, 1, 5, 4, 2_000_005, 8,
+            7, 400_010, 3, 800_010, 9, 150_000, 2, 250_015, 1, 5, 4, 2_000_005, 8,
         ];
         // The second is too small to be counted well.
         assert_eq!(
             kernels(names.clone(), &counted).unwrap(),
-            counts(&[("a", 200_000), ("c", 2_000_000)])
+            counts(&[("a", 400_000), ("c", 2_000_000)])
         );
         assert!(kernels(names, &counted[..11]).is_err());
         assert!(kernels(Vec::new(), &counted).is_err());

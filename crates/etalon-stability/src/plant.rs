@@ -2,6 +2,7 @@
 
 use std::str::FromStr;
 
+use etalon_core::format::SampleKind;
 use etalon_core::texel::Texel;
 
 use crate::executors::Kind;
@@ -14,7 +15,8 @@ pub enum Fault {
     Nan,
     /// A bit of a texel of the last pass is turned.
     Bit,
-    /// The first texel of the first pass is off by a hundredth, and its shadow is not.
+    /// The first texel of the first pass that stores no integers is off by a hundredth,
+    /// and its shadow is not.
     Error,
 }
 
@@ -79,7 +81,10 @@ impl Fault {
                 }
             }
             Self::Error => {
-                let first = stores.iter_mut().find_map(|store| store.image.as_mut());
+                let mut images = stores.iter_mut().filter_map(|store| store.image.as_mut());
+                let integers = [SampleKind::Uint, SampleKind::Sint];
+                let first =
+                    images.find(|image| !integers.contains(&image.desc.format.sample_kind()));
                 let Some(image) = first else { return };
                 let format = image.desc.format;
                 let size = format.texel_bytes() as usize;

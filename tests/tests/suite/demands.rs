@@ -115,7 +115,9 @@ impl Screen {
                     ));
                 }
             }
-            if self.light[index] != self.opaque_light[index] {
+            // Bits, as some are no numbers.
+            let bits = |light: &[[f32; 4]]| light[index].map(f32::to_bits);
+            if bits(&self.light) != bits(&self.opaque_light) {
                 within("something seen through", demands.transparent)?;
             }
             // As kernels read it.

@@ -23,6 +23,8 @@ struct Use {
     range: Subresources,
     reads: bool,
     writes: bool,
+    /// Whether what was written before stays where this writes nothing.
+    keeps: bool,
 }
 
 const WHOLE: Subresources = Subresources {
@@ -49,6 +51,7 @@ fn bound(binding: &Binding, bound: &Bound) -> Option<Use> {
         range,
         reads,
         writes,
+        keeps: false,
     })
 }
 
@@ -58,12 +61,14 @@ fn uses(step: &Step) -> Vec<Use> {
         range,
         reads: true,
         writes: false,
+        keeps: false,
     };
     let written = |resource, range| Use {
         resource,
         range,
         reads: false,
         writes: true,
+        keeps: false,
     };
     match step {
         Step::Dispatch {
@@ -74,6 +79,10 @@ fn uses(step: &Step) -> Vec<Use> {
             let pairs = kernel.0.bindings.iter().zip(bindings);
             let mut uses: Vec<Use> = pairs.filter_map(|(a, b)| bound(a, b)).collect();
             if let Groups::Indirect { buffer, .. } = groups {
+                // It reaches as much as the buffer says.
+                for used in &mut uses {
+                    used.keeps = used.writes;
+                }
                 uses.push(read(*buffer, WHOLE));
             }
             uses
@@ -84,6 +93,7 @@ fn uses(step: &Step) -> Vec<Use> {
                 range: target.range,
                 reads: target.clear.is_none(),
                 writes: true,
+                keeps: false,
             };
             let mut uses: Vec<Use> = raster.colours.iter().map(target).collect();
             // Depth that no draw writes is handed on as it is.
@@ -148,10 +158,10 @@ pub(super) fn edges(plan: &Plan) -> Vec<Edge> {
     let mut writers: BTreeMap<(u32, u32, u32), usize> = BTreeMap::new();
     for (index, step) in plan.steps.iter().enumerate() {
         let uses = uses(&step.step);
-        for used in uses.iter().filter(|used| used.reads) {
+        for used in uses.iter().filter(|used| used.reads || used.keeps) {
             for (mip, layer) in parts(plan, used) {
                 let from = writers.get(&(used.resource, mip, layer)).copied();
-                if from != Some(index) {
+                if from != Some(index) && (used.reads || from.is_some()) {
                     edges.insert(Edge {
                         from,
                         to: Some(index),

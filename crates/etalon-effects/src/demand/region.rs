@@ -34,6 +34,9 @@ impl Region {
     /// if there are none.
     #[must_use]
     pub fn of_texels(min: [u32; 2], max: [u32; 2], size: [u32; 2]) -> Option<Self> {
+        if min[0] >= max[0] || min[1] >= max[1] {
+            return None;
+        }
         let share = |texels: [u32; 2], axis: usize, outward: f64| {
             // One rounding is less than 2⁻²⁴; the texel that it might take away is
             // given back by going outward by more.

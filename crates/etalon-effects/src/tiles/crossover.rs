@@ -18,10 +18,11 @@ pub struct Cost {
 }
 
 /// Of [`ssr`](fn@crate::ssr::ssr) with its defaults, as multiples of its time without
-/// tiles: to be measured.
+/// tiles, on the interpreter: of what was measured, where tiles pay least (see
+/// `docs/measurements/economy.md`).
 pub const MEASURED: Cost = Cost {
-    idle: 0.02,
-    slope: 1.0,
+    idle: 0.043,
+    slope: 1.021,
     whole: 1.0,
 };
 

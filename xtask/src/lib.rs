@@ -37,6 +37,9 @@ enum Task {
     /// What accuracy costs in time: every setting's errors beside its time on
     /// every backend; `--help` after it says more.
     Accuracy(measure::Forwarded),
+    /// What effects cost by the share of the screen they concern, and where tiles do
+    /// not pay; `--help` after it says more.
+    Economy(measure::Forwarded),
     /// Every effect on a corpus of hard cases: numbers everywhere, the same bits on
     /// every backend, rounding bounded; `--help` after it says more.
     Stability(measure::Forwarded),
@@ -77,6 +80,9 @@ pub fn main() -> ExitCode {
         ),
         Task::Accuracy(arguments) => conclude(
             measure::run(measure::ACCURACY, &[], &arguments).map_err(|error| error.to_string()),
+        ),
+        Task::Economy(arguments) => conclude(
+            measure::run(measure::ECONOMY, &[], &arguments).map_err(|error| error.to_string()),
         ),
         Task::Stability(arguments) => conclude(
             measure::run(measure::STABILITY, &[], &arguments).map_err(|error| error.to_string()),

@@ -1,6 +1,6 @@
 //! Tasks that measure. What is measured has to be built as it is released, so
-//! programs of their own do it, the packages `etalon-measure`, `etalon-accuracy`
-//! and `etalon-stability`.
+//! programs of their own do it, the packages `etalon-measure`, `etalon-accuracy`,
+//! `etalon-economy` and `etalon-stability`.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -43,6 +43,8 @@ fn cargo() -> Command {
 pub const INTERPRETER: &str = "etalon-measure";
 /// The program that measures what accuracy costs in time.
 pub const ACCURACY: &str = "etalon-accuracy";
+/// The program that measures what effects cost by the screen they concern.
+pub const ECONOMY: &str = "etalon-economy";
 /// The program that runs the hard cases.
 pub const STABILITY: &str = "etalon-stability";
 

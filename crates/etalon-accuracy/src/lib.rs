@@ -15,6 +15,7 @@
 //! * [`front`](mod@front): what costs least for its error;
 //! * [`chart`]: error against time, drawn;
 //! * [`report`]: the charts with all about every point, as a web page and a table;
+//! * [`text`]: numbers and names as people read them;
 //! * [`table`](mod@table), [`profile`](mod@profile): the fronts for a terminal, and
 //!   for settings that fit a budget.
 
@@ -35,5 +36,5 @@ pub mod stage;
 pub mod store;
 pub mod sweep;
 pub mod table;
-mod text;
+pub mod text;
 pub mod work;

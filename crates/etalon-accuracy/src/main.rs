@@ -12,9 +12,8 @@ use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::sweep::{LEAST_FRAMES, Options, Progress, Scenes, sweep};
-use etalon_accuracy::{profile, report, store, table};
+use etalon_accuracy::{profile, report, store, table, text};
 use etalon_effects::{EffectEntry, effect, effects};
-use etalon_scenes::FrameSize;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Sweeps the settings of effects: their errors against independent truths beside
@@ -81,12 +80,6 @@ impl Arguments {
     }
 
     fn options(&self) -> Result<Options, String> {
-        let size = self
-            .size
-            .split_once(['x', '×'])
-            .and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
-        let (width, height) =
-            size.ok_or_else(|| format!("`{}` is no size like 640x360", self.size))?;
         let minutes = self.budget_minutes;
         let budget = Duration::try_from_secs_f64(minutes * 60.0)
             .map_err(|_| format!("{minutes} minutes are no time that can be waited"))?;
@@ -98,7 +91,7 @@ impl Arguments {
                 names => Scenes::Named(names.to_vec()),
             },
             backends: self.backend.clone(),
-            size: FrameSize::new(width, height).map_err(|error| error.to_string())?,
+            size: text::size(&self.size)?,
             depth: self.depth.min(8),
             frames: self.frames.max(LEAST_FRAMES),
             budget,

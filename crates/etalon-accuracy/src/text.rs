@@ -2,6 +2,19 @@
 
 use std::collections::BTreeMap;
 
+use etalon_scenes::FrameSize;
+
+/// The size of a picture, given as `640x360`.
+///
+/// # Errors
+/// In words, if the text says none or none that is possible.
+pub fn size(text: &str) -> Result<FrameSize, String> {
+    let sides = text.split_once(['x', '×']);
+    let sides = sides.and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    let (width, height) = sides.ok_or_else(|| format!("`{text}` is no size like 640x360"))?;
+    FrameSize::new(width, height).map_err(|error| error.to_string())
+}
+
 /// Text for HTML and SVG, in elements and in quoted attributes. Characters that XML
 /// cannot hold at all become U+FFFD.
 #[must_use]
@@ -24,7 +37,8 @@ pub fn escape(text: &str) -> String {
 }
 
 /// A figure in three significant digits; 0 is `0` and nothing else is.
-pub(crate) fn number(value: f64) -> String {
+#[must_use]
+pub fn number(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
@@ -90,13 +104,15 @@ fn time_unit(nanoseconds: f64) -> (f64, &'static str) {
 }
 
 /// A time in nanoseconds, in three significant digits.
-pub(crate) fn time(nanoseconds: f64) -> String {
+#[must_use]
+pub fn time(nanoseconds: f64) -> String {
     let (size, unit) = time_unit(nanoseconds);
     format!("{} {unit}", number(nanoseconds / size))
 }
 
 /// Bytes, in three significant digits.
-pub(crate) fn bytes(bytes: u64) -> String {
+#[must_use]
+pub fn bytes(bytes: u64) -> String {
     let mut value = bytes as f64;
     if value < 1024.0 {
         return format!("{bytes} B");
@@ -187,6 +203,17 @@ mod tests {
         }
         assert_eq!(count(7), "7");
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
+    }
+
+    #[test]
+    fn sizes_are_two_numbers() {
+        for text in ["640x360", "640×360"] {
+            assert_eq!(size(text), Ok(FrameSize::new(640, 360).unwrap()));
+        }
+        for text in ["", "640", "640x", "x360", "-1x5", "640x360x2", "a×b"] {
+            assert_eq!(size(text), Err(format!("`{text}` is no size like 640x360")));
+        }
+        assert!(size("0x5").is_err() && size("99999x99999").is_err());
     }
 
     #[test]

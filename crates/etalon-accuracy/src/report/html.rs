@@ -10,7 +10,8 @@ use crate::store::FILE;
 use crate::text::{count, escape};
 
 const PAGE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("style.css");
+/// Colours and rules of the page, which other reports share.
+pub const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("script.js");
 
 /// The page. Pictures, the data and the table are looked for beside it.

@@ -15,7 +15,7 @@ use crate::model::Sweep;
 use crate::store::{self, StoreError};
 
 pub use csv::csv;
-pub use html::{page, render};
+pub use html::{STYLE, page, render};
 
 pub use crate::text::escape;
 

@@ -185,10 +185,11 @@ impl Ssr {
         self.check_knobs()
     }
 
-    /// These settings for a frame of which a share, in `[0, 1]`, mirrors: without tiles
-    /// from the share on where they take longer on a device than no tiles at all. The
-    /// picture is the same. [`MEASURED`](crate::tiles::crossover::MEASURED) stands for a
-    /// device that was not measured.
+    /// These settings for a frame in which tiles that cover a share of the screen, in
+    /// `[0, 1]`, are marched: without tiles from the share on where those take longer on a
+    /// device than the whole picture. The picture is the same.
+    /// [`MEASURED`](crate::tiles::crossover::MEASURED) stands for a device that was not
+    /// measured.
     #[must_use]
     pub fn for_coverage(self, coverage: f64, cost: &Cost) -> Self {
         let tiles = if coverage >= cost.crossover() {

@@ -1,8 +1,8 @@
 //! From which share of the screen on tiles cost more than they save.
 //!
 //! The time of an effect on tiles is nearly a line, `idle + slope · coverage`, over the
-//! share of the screen that it concerns; without tiles it is the same whatever the
-//! share. `cargo xtask economy --crossover FILE` measures both on a device.
+//! share of the screen that its heavy tiles cover; without tiles it is the same whatever
+//! the share. `cargo xtask economy --crossover FILE` measures both on a device.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,10 +18,11 @@ pub struct Cost {
 }
 
 /// Of [`ssr`](fn@crate::ssr::ssr) with its defaults, as multiples of its time without
-/// tiles: to be measured.
+/// tiles, on the interpreter: of what was measured, where tiles pay least (see
+/// `docs/measurements/economy.md`).
 pub const MEASURED: Cost = Cost {
-    idle: 0.02,
-    slope: 1.0,
+    idle: 0.043,
+    slope: 1.021,
     whole: 1.0,
 };
 

@@ -191,7 +191,7 @@ fn series(svg: &mut String, axis: Axis, sweep: &Sweep) {
         svg,
         "<path class=\"fit whole\" d=\"M{x0:.1} {whole:.1}H{x1:.1}\"/>"
     );
-    let crossover = sweep.cost.crossover();
+    let crossover = sweep.crossover();
     if crossover > 0.0 && crossover < 1.0 {
         let x = across(crossover);
         let _ = writeln!(

@@ -42,9 +42,11 @@ pub struct Sweep {
     pub layout: Layout,
     /// From the smallest share to the largest.
     pub points: Vec<Point>,
-    /// The time on tiles over the share: the medians of the points.
+    /// The time on tiles over the share that mirrors: the medians of the points.
     pub fit: Line,
-    /// What the fit says of when to use tiles.
+    /// The same over the share that is marched, which is what takes the time.
+    pub work: Line,
+    /// What that says of when to use tiles.
     pub cost: Cost,
 }
 
@@ -66,6 +68,18 @@ pub struct Point {
 }
 
 impl Sweep {
+    /// The share of the screen that mirrors below which tiles are faster, by the line
+    /// over that share.
+    #[must_use]
+    pub fn crossover(&self) -> f64 {
+        let line = Cost {
+            idle: self.fit.intercept,
+            slope: self.fit.slope,
+            whole: self.cost.whole,
+        };
+        line.crossover()
+    }
+
     /// The point nearest to a share.
     #[must_use]
     pub fn near(&self, coverage: f64) -> Option<&Point> {

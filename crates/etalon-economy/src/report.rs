@@ -142,7 +142,9 @@ fn header(body: &mut String, economy: &Economy) {
          (<em>compact</em>), or squares of 16 × 16 texels strewn over it (<em>scattered</em>). On tiles, what shows \
          nothing mirrored is only copied; the picture is the same, bit for bit, which was checked for every point. \
          The line is <code>t = a + b · share</code> by least squares: <em>a</em> is what reflections cost where \
-         there are none, and where the line meets the time on the whole picture it is better to do without tiles. \
+         there are none, and where the line meets the time on the whole picture it is better to do without tiles. What takes the time is the \
+         share that is <em>marched</em>, tiles around rough ones included; over that the time is a line in either \
+         layout. \
          Bars are the middle half of the times of all frames.</p>\n",
         escape(&economy.scene)
     );
@@ -162,14 +164,17 @@ fn conclusions(body: &mut String, sweeps: &[&Sweep]) {
          <th class=\"figure\" scope=\"col\">Idle, a</th><th class=\"figure\" scope=\"col\">of the whole</th>\
          <th class=\"figure\" scope=\"col\">Slope, b</th><th class=\"figure\" scope=\"col\">R²</th>\
          <th class=\"figure\" scope=\"col\">Classification</th><th class=\"figure\" scope=\"col\">Whole</th>\
-         <th class=\"figure\" scope=\"col\">Tiles are faster below</th><th scope=\"col\">Aims</th></tr></thead>\n<tbody>\n",
+         <th class=\"figure\" scope=\"col\">Tiles are faster below, mirroring</th>\
+         <th class=\"figure\" scope=\"col\">Marched: idle</th><th class=\"figure\" scope=\"col\">slope</th>\
+         <th class=\"figure\" scope=\"col\">R²</th><th class=\"figure\" scope=\"col\">Tiles are faster below, marched</th>\
+         <th scope=\"col\">Aims</th></tr></thead>\n<tbody>\n",
     );
     for sweep in sweeps {
         let classification = sweep.points.iter().map(|point| point.classification.median);
         let classification = classification.fold(0.0, f64::max);
         let whole = sweep.cost.whole;
         let of_whole = if whole > 0.0 {
-            percent(sweep.cost.idle / whole)
+            percent(sweep.fit.intercept / whole)
         } else {
             "?".to_owned()
         };
@@ -188,13 +193,18 @@ fn conclusions(body: &mut String, sweeps: &[&Sweep]) {
             body,
             "<tr><th scope=\"row\">{}</th><td class=\"figure\">{}</td><td class=\"figure\">{of_whole}</td>\
              <td class=\"figure\">{}</td><td class=\"figure\">{}</td><td class=\"figure\">{}</td>\
-             <td class=\"figure\">{}</td><td class=\"figure\">{}</td><td>{}</td></tr>",
+             <td class=\"figure\">{}</td><td class=\"figure\">{}</td><td class=\"figure\">{}</td>\
+             <td class=\"figure\">{}</td><td class=\"figure\">{}</td><td class=\"figure\">{}</td><td>{}</td></tr>",
             sweep.layout,
-            time(sweep.cost.idle),
-            time(sweep.cost.slope),
+            time(sweep.fit.intercept),
+            time(sweep.fit.slope),
             number(sweep.fit.r_squared),
             time(classification),
             time(whole),
+            percent(sweep.crossover()),
+            time(sweep.cost.idle),
+            time(sweep.cost.slope),
+            number(sweep.work.r_squared),
             percent(sweep.cost.crossover()),
             aims.join(" "),
         );

@@ -480,21 +480,25 @@ fn point(scene: &Masked, samples: &[Sample], marched: f64) -> Result<Point, Metr
     })
 }
 
-/// The line through a sweep's points, and what follows from it.
+/// The lines through a sweep's points, and what follows from them.
 pub(crate) fn conclude(sweep: &mut model::Sweep) -> Result<(), EconomyError> {
-    let points = sweep.points.iter();
-    let points: Vec<_> = points
-        .map(|point| (point.coverage, point.tiled.median))
-        .collect();
-    sweep.fit = fit::line(&points)?;
+    let over = |share: fn(&Point) -> f64| {
+        let points = sweep.points.iter();
+        let points: Vec<_> = points
+            .map(|point| (share(point), point.tiled.median))
+            .collect();
+        fit::line(&points)
+    };
+    let (fit, work) = (over(|point| point.coverage)?, over(|point| point.marched)?);
     let whole: Vec<f64> = sweep
         .points
         .iter()
         .map(|point| point.whole.median)
         .collect();
+    (sweep.fit, sweep.work) = (fit, work);
     sweep.cost = Cost {
-        idle: sweep.fit.intercept,
-        slope: sweep.fit.slope,
+        idle: work.intercept,
+        slope: work.slope,
         whole: spread(&whole)?.median,
     };
     Ok(())
@@ -518,7 +522,8 @@ mod tests {
     fn a_sweep_crosses_where_its_line_meets_the_whole() {
         let points = COVERAGES.map(|coverage| Point {
             coverage,
-            tiled: times(2.0 + 10.0 * coverage),
+            marched: (2.0 * coverage).min(1.0),
+            tiled: times(2.0 + 10.0 * (2.0 * coverage).min(1.0)),
             whole: times(7.0),
             ..Point::default()
         });
@@ -527,7 +532,9 @@ mod tests {
             ..Sweep::default()
         };
         conclude(&mut sweep).unwrap();
-        assert!((sweep.fit.r_squared - 1.0).abs() < 1e-12);
+        // A line over what is marched, and none over what mirrors.
+        assert!((sweep.work.r_squared - 1.0).abs() < 1e-12);
+        assert!(sweep.fit.r_squared < 0.9);
         assert!((sweep.cost.crossover() - 0.5).abs() < 1e-12, "{sweep:?}");
     }
 

@@ -24,11 +24,15 @@ pub fn verdict(sweep: &Sweep) -> String {
         }
     };
     format!(
-        "idle {} ({} of the whole), slope {} per screen, R² {}, tiles are faster below {} of the screen",
-        time(cost.idle),
-        share(cost.idle),
-        time(cost.slope),
+        "idle {} ({} of the whole), {} more per screen that mirrors (R² {}); {} and {} more per screen marched (R² {}), \
+         so that tiles are faster below {} marched",
+        time(sweep.fit.intercept),
+        share(sweep.fit.intercept),
+        time(sweep.fit.slope),
         number(sweep.fit.r_squared),
+        time(cost.idle),
+        time(cost.slope),
+        number(sweep.work.r_squared),
         percent(cost.crossover()),
     )
 }

@@ -39,6 +39,7 @@ fn sweep(executor: &str, layout: Layout, idle: f64, crossover: f64) -> Sweep {
         layout,
         points: points.to_vec(),
         fit: fit::line(&line).unwrap(),
+        work: fit::line(&line).unwrap(),
         cost: Cost {
             idle: idle * 1e6,
             slope,

@@ -15,3 +15,4 @@ mod operations;
 mod position;
 mod programs;
 mod shading;
+mod tiles;

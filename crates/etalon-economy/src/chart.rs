@@ -202,7 +202,13 @@ fn series(svg: &mut String, axis: Axis, sweep: &Sweep) {
     }
     for point in &sweep.points {
         let what = format!("on tiles, {class}, {} mirroring", percent(point.coverage));
-        mark(svg, axis, (class.as_str(), point.coverage), &point.tiled, &what);
+        mark(
+            svg,
+            axis,
+            (class.as_str(), point.coverage),
+            &point.tiled,
+            &what,
+        );
     }
 }
 

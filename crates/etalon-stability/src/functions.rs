@@ -466,7 +466,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
                 // Where nothing normal is left it may be flushed to zero.
                 let flushed = exact.abs() <= f64::from(f32::MIN_POSITIVE) && stored == 0.0;
                 // Written so that a NaN is wrong.
-                !(flushed || (stored - exact).abs() <= self.ulps * unit)
+                let right = flushed || (stored - exact).abs() <= self.ulps * unit;
+                !right
             });
             if let Some(channel) = wrong {
                 let found = found.get_or_insert_with(|| Untrue {

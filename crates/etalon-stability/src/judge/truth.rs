@@ -174,7 +174,8 @@ fn adaptation<'a>(
         ("factor", factor, exact.factor),
     ] {
         // Written so that a NaN is wrong.
-        if !((stored - exact).abs() <= bound * exact.abs()) {
+        let right = (stored - exact).abs() <= bound * exact.abs();
+        if !right {
             wrong.push(Wrong {
                 store,
                 index: 0,
@@ -201,7 +202,8 @@ fn picture<'a>(
             let (stored, exact) = (stored[channel], exact[channel]);
             let step = half_step(format, channel, exact.abs().max(stored.abs()));
             // Written so that a NaN is wrong.
-            !((stored - exact).abs() <= step + bound * exact.abs().max(1.0))
+            let right = (stored - exact).abs() <= step + bound * exact.abs().max(1.0);
+            !right
         })?;
         Some(Wrong {
             store,

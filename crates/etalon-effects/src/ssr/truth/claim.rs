@@ -126,7 +126,8 @@ impl<'a> Claims<'a> {
         let beyond = (place - ray.end).max(-place);
         let texels = aside.max(beyond);
         // Written so that what is no number is wrong.
-        if !(texels <= 2.0 * near) {
+        let passes = texels <= 2.0 * near;
+        if !passes {
             let end = ray.end;
             return Err(FalseHit::Beside { texels, end });
         }
@@ -138,7 +139,8 @@ impl<'a> Claims<'a> {
         let exact = at(place).distance(ray.start);
         let unsure = at(place + near).distance(at(place - near));
         // 2^-11 is also what a half float rounds by.
-        if !((length - exact).abs() <= unsure + exact / 1024.0) {
+        let as_long = (length - exact).abs() <= unsure + exact / 1024.0;
+        if !as_long {
             let stored = length;
             return Err(FalseHit::Length { stored, exact });
         }

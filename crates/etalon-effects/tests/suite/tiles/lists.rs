@@ -33,7 +33,7 @@ impl Grid {
     fn random(width: u32, height: u32, seed: u32, one_in: u32) -> Self {
         Self::new(width, height, |x, y| {
             let random = hash(seed ^ hash(x ^ hash(y)));
-            if random % one_in == 0 {
+            if random.is_multiple_of(one_in) {
                 1 + (random >> 16) % 3
             } else {
                 0

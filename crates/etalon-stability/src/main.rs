@@ -49,7 +49,7 @@ struct Arguments {
     #[arg(long)]
     kernels: Option<PathBuf>,
     /// Take the guards of kernels away, one at a time, and see whether anything is found:
-    /// takes some ten minutes on frames of up to 2048 texels, unless `--largest` says
+    /// runs the corpus for each, on frames of up to 2048 texels, unless `--largest` says
     /// otherwise.
     #[arg(long)]
     mutate: bool,

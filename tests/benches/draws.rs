@@ -11,7 +11,7 @@ use std::path::Path;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use etalon::backend::Backend;
 use etalon::graph::Graph;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::{Capture, Plan};
 use etalon_scenes::model::gltf::{GltfOptions, load_gltf};
 use etalon_scenes::model::{Model, Shot};
@@ -55,7 +55,7 @@ fn plan(executor: &dyn Backend, shot: &Shot, part: Part) -> Plan {
         Part::Forward => drawn.light,
     };
     graph.output("result", result).expect("the only output");
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     plan_for(executor, &graph, &kernels, Arithmetic::Fast, Capture::None).expect("a valid graph")
 }
 

@@ -48,9 +48,9 @@ fn translation(criterion: &mut Criterion) {
             .expect("a valid graph")
         };
         group.bench_function(BenchmarkId::new("compile", effect.name), |bencher| {
-            bencher.iter(|| black_box(plan(&KernelLibrary::new())));
+            bencher.iter(|| black_box(plan(&etalon::effects::kernels())));
         });
-        let compiled: Plan = plan(&KernelLibrary::new());
+        let compiled: Plan = plan(&etalon::effects::kernels());
         group.bench_function(BenchmarkId::new("bytecode", effect.name), |bencher| {
             bencher.iter(|| {
                 for step in &compiled.steps {
@@ -67,7 +67,7 @@ fn translation(criterion: &mut Criterion) {
 }
 
 fn execution(criterion: &mut Criterion) {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     for (width, height) in [(640, 360), (1280, 720)] {
         let frame = frame(width, height);
         for effect in effects() {

@@ -17,7 +17,7 @@ use etalon::effects::environment::{
 use etalon::effects::{ChainSettings, chain};
 use etalon::graph::Graph;
 use etalon::image::{ImageData, ImageError};
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::Capture;
 use etalon::resource::TextureDesc;
 use etalon_scenes::model::gltf::{GltfOptions, load_gltf};
@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (name, texture, _) in outputs {
         graph.output(name, texture)?;
     }
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let fast = Arithmetic::Fast;
     let plan = plan_for(backend.as_ref(), &graph, &kernels, fast, Capture::Outputs)?;
     let inputs = shot.inputs().texture("studio", studio.image());

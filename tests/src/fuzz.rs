@@ -10,7 +10,7 @@ use etalon::cpu::{
     View,
 };
 use etalon::format::Format;
-use etalon::kernel::{Arithmetic, KernelLibrary, KernelRequest};
+use etalon::kernel::{Arithmetic, KernelRequest};
 use etalon::resource::{Dimension, Extent, SamplerDesc, TextureDesc};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{Module, ShaderStage};
@@ -185,7 +185,7 @@ pub fn program(bytes: &[u8]) {
 /// arithmetics where they differ, and some random programs.
 #[must_use]
 pub fn corpus() -> Vec<String> {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut texts: Vec<String> = Vec::new();
     for path in kernels.paths() {
         for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use etalon_core::backend::Backend;
 use etalon_core::graph::Graph;
-use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::{Capture, Plan, PlanOptions};
 use etalon_cpu::{CpuBackend, CpuOptions, NumberType, Tier};
 use etalon_effects::registry::effects;
@@ -30,7 +30,7 @@ fn main() -> Result<(), Failure> {
     let (width, height): (u32, u32) = (width.parse()?, height.parse()?);
     let size = FrameSize::new(width, height)?;
     let frame = scene("wet-floor").ok_or("no scene")?.frame(size)?;
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     println!("shortest of {rounds} rounds, microseconds, and ratios to f32");
     let bytes = 128 * (width * height) as usize;
     let time = copying(bytes, threads, rounds);

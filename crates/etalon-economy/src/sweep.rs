@@ -172,7 +172,7 @@ pub fn sweep(options: &Options, progress: &mut dyn Progress) -> Result<Economy, 
         executors.push(opened.map_err(|source| EconomyError::Backend { kind, source })?);
     }
     let frame = entry.frame(options.size)?;
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut economy = Economy {
         size,
         scene: entry.name.to_owned(),

@@ -65,3 +65,10 @@ pub use error::{EffectError, SettingError};
 pub use quality::Quality;
 pub use registry::{EffectEntry, effect, effects};
 pub use scene::{CameraParams, DepthRange, SceneInputs};
+
+/// A library of the kernels of all effects, to plan graphs with and to add one's own
+/// to.
+#[must_use]
+pub fn kernels() -> etalon_core::kernel::KernelLibrary {
+    etalon_core::kernel::KernelLibrary::of(etalon_shaders::sources())
+}

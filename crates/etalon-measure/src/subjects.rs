@@ -275,7 +275,7 @@ impl Subject {
 /// All kernels, the small ones too.
 #[must_use]
 pub fn library() -> KernelLibrary {
-    let mut library = KernelLibrary::new();
+    let mut library = etalon_effects::kernels();
     for (path, text) in KERNELS {
         library.add_source(path, text);
     }

@@ -503,7 +503,7 @@ pub fn run(
     watch: &mut Watch,
     kernels: &[(String, String)],
 ) -> Vec<CaseReport> {
-    let mut library = KernelLibrary::new();
+    let mut library = etalon_effects::kernels();
     for (path, text) in kernels {
         library.add_source(path, text);
     }

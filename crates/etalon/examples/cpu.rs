@@ -10,7 +10,6 @@ use etalon::backend::Backend;
 use etalon::cpu::{CpuBackend, CpuOptions};
 use etalon::effects::{ChainSettings, chain};
 use etalon::graph::Graph;
-use etalon::kernel::KernelLibrary;
 use etalon::plan::{Capture, Plan, PlanOptions};
 use etalon_scenes::picture::{Look, write_png};
 use etalon_scenes::{FrameSize, scene};
@@ -33,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         capture: Capture::Outputs,
         ..PlanOptions::default()
     };
-    let plan = Plan::new(&graph, &KernelLibrary::new(), &options)?;
+    let plan = Plan::new(&graph, &etalon::effects::kernels(), &options)?;
     print!("{plan}");
 
     let execution = cpu.execute(&plan, &frame.inputs())?;

@@ -10,7 +10,6 @@ use etalon::backend::Backend;
 use etalon::effects::{ChainSettings, chain};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
-use etalon::kernel::KernelLibrary;
 use etalon::plan::{Plan, PlanOptions};
 use etalon::wgpu::{WgpuBackend, WgpuBindings, wgpu};
 use etalon_scenes::{FrameSize, scene};
@@ -101,7 +100,7 @@ fn main() -> Result<()> {
     let usage = wgpu::TextureUsages::STORAGE_BINDING | wgpu::TextureUsages::TEXTURE_BINDING;
     let picture = engine.texture(640, 360, Format::Rgba8Unorm, usage)?;
 
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut effects = WgpuBackend::adopt(
         engine.device.clone(),
         engine.queue.clone(),

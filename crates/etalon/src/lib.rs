@@ -24,8 +24,8 @@
 //! 1. Make a [`Graph`](graph::Graph), import the engine's textures, call the
 //!    effects, ask for outputs.
 //! 2. Make a [`Plan`](plan::Plan) of it. Both are cheap enough to do anew in
-//!    every frame; kernels are compiled once, by the
-//!    [`KernelLibrary`](kernel::KernelLibrary).
+//!    every frame; kernels are compiled once, by a
+//!    [`KernelLibrary`](kernel::KernelLibrary) such as [`effects::kernels`] makes.
 //! 3. Have the backend record the plan into the engine's own command stream.
 //!    Frames whose plans differ only in the values of settings create nothing.
 

@@ -63,7 +63,7 @@ fn hold(
 
 #[test]
 fn every_pass_of_every_effect_is_bit_equal_on_every_backend() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut executors = executors();
     for scene in scenes() {
         let frame = scene.frame(FrameSize::new(97, 55).unwrap()).unwrap();
@@ -76,7 +76,7 @@ fn every_pass_of_every_effect_is_bit_equal_on_every_backend() {
 /// Choices make other kernels; so does every one of them agree.
 #[test]
 fn every_choice_of_every_knob_is_bit_equal_on_every_backend() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut executors = executors();
     let scene = scene("wet-floor").unwrap();
     let frame = scene.frame(FrameSize::new(97, 55).unwrap()).unwrap();
@@ -110,7 +110,7 @@ fn a_changed_constant_in_one_backends_kernel_is_found() {
     let last = executors.len() - 1;
     let frame = scene("wet-floor").unwrap();
     let frame = frame.frame(FrameSize::new(64, 36).unwrap()).unwrap();
-    let mut planted = KernelLibrary::new();
+    let mut planted = etalon::effects::kernels();
     let colour = planted.source("lib/colour").unwrap().to_string();
     let changed = colour.replacen("0.7152", "0.7153", 1);
     assert_ne!(colour, changed);
@@ -125,9 +125,9 @@ fn a_changed_constant_in_one_backends_kernel_is_found() {
         let plan = plan_for(executor, &graph, kernels, strict, Capture::EveryPass).unwrap();
         executor.execute(&plan, &frame.inputs()).unwrap()
     };
-    let good = run(0, &KernelLibrary::new());
+    let good = run(0, &etalon::effects::kernels());
     assert_eq!(
-        first_difference(&good, &run(last, &KernelLibrary::new())),
+        first_difference(&good, &run(last, &etalon::effects::kernels())),
         None
     );
     let found = first_difference(&good, &run(last, &planted)).unwrap();

@@ -8,7 +8,7 @@ use etalon::backend::{Backend, Execution, Inputs};
 use etalon::effects::CameraParams;
 use etalon::effects::geometry::{DrawClass, Geometry, Item, Surface, View, gbuffer, prepass};
 use etalon::graph::Graph;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::Capture;
 use etalon::raster::{StepMode, VertexAttribute, VertexFormat, VertexLayout};
 use etalon::resource::BufferDesc;
@@ -96,7 +96,7 @@ fn draw(executor: &mut dyn Backend, triangles: &[Triangle]) -> Execution {
     graph.output("depth", pre.depth).unwrap();
     graph.output("velocity", pre.velocity.unwrap()).unwrap();
     graph.output("colour", surfaces.colour).unwrap();
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let strict = Arithmetic::Strict;
     let plan = plan_for(executor, &graph, &kernels, strict, Capture::Outputs).unwrap();
     let inputs = Inputs::new().buffer("corners", &bytes);

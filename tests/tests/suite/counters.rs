@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use etalon::backend::{Backend, Counters, Inputs};
 use etalon::effects::{ChainSettings, chain};
 use etalon::graph::{Graph, ResourceDesc};
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::{Capture, Plan};
 use etalon::resource::BufferDesc;
 use etalon_scenes::model::Shot;
@@ -78,7 +78,7 @@ fn backends_count_what_the_plan_of_a_chain_says() {
         .frame(FrameSize::new(96, 54).unwrap())
         .unwrap();
     for executor in &mut executors() {
-        let kernels = KernelLibrary::new();
+        let kernels = etalon::effects::kernels();
         let mut graph = Graph::new();
         let inputs = frame.import(&mut graph, 1.0 / 60.0).unwrap();
         let result = chain(&mut graph, &inputs, &ChainSettings::full()).unwrap();
@@ -102,7 +102,7 @@ fn backends_count_what_the_plan_of_draws_says() {
     let shot = Shot::new(model, 0.5).unwrap();
     let size = FrameSize::new(64, 36).unwrap();
     for executor in &mut executors() {
-        let kernels = KernelLibrary::new();
+        let kernels = etalon::effects::kernels();
         let mut graph = Graph::new();
         let sky = Shot::sky(&mut graph).unwrap();
         let drawn = shot.draw(&mut graph, size, sky, 1.0 / 60.0).unwrap();
@@ -124,7 +124,7 @@ fn backends_count_what_the_plan_of_draws_says() {
 /// Workgroups that only the device knows are counted by the interpreter alone.
 #[test]
 fn indirect_invocations_are_counted_apart() {
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     kernels.add_source(
         "test/arguments",
         "@group(0) @binding(0) var<storage, read_write> groups: array<u32>;

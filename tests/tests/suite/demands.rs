@@ -59,7 +59,7 @@ struct Screen {
 impl Screen {
     fn of_shot(shot: &Shot, size: FrameSize) -> Self {
         let mut cpu = cpu().unwrap();
-        let kernels = KernelLibrary::new();
+        let kernels = etalon::effects::kernels();
         let all = drawn(cpu.as_mut(), &kernels, shot, size, true);
         let opaque = drawn(cpu.as_mut(), &kernels, shot, size, false);
         let texels = |of: &Execution, name: &str| of.output(name).unwrap().to_rgba_f32().unwrap();

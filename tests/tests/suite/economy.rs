@@ -70,7 +70,7 @@ fn effects_nobody_asks_for_leave_no_pass_kernel_pipeline_or_byte() {
         // A fresh executor and library each, so that the counters are of one plan.
         let run = |unasked: bool| -> (Plan, KernelStats, Counters, Execution) {
             let mut executor = executors().remove(index);
-            let kernels = KernelLibrary::new();
+            let kernels = etalon::effects::kernels();
             let plan = plan(executor.as_ref(), &kernels, &frame, &settings, unasked);
             let execution = executor.execute(&plan, &frame.inputs()).unwrap();
             (plan, kernels.stats(), executor.counters(), execution)
@@ -99,7 +99,7 @@ fn effects_nobody_asks_for_leave_no_pass_kernel_pipeline_or_byte() {
 #[test]
 fn a_steady_frame_creates_nothing() {
     let frame = frame();
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     for executor in &mut executors() {
         let mut settings = ChainSettings::full();
         let mut counters = Vec::new();
@@ -124,7 +124,7 @@ fn run_fresh(
     build: impl Fn(&mut Graph),
 ) -> (Plan, KernelStats, Counters, Execution) {
     let mut executor = executors().remove(index);
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut graph = Graph::new();
     build(&mut graph);
     let plan = plan_for(
@@ -247,7 +247,7 @@ fn transient_memory_of_drawn_frames_is_within_half_of_the_least() {
     use etalon::effects::demand::Outputs;
     use etalon::effects::frame::Shading;
     use etalon_scenes::models;
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let executors = executors();
     let mut worst = 0.0_f64;
     for entry in models() {

@@ -43,7 +43,7 @@ fn run(
 
 /// What the interpreter makes, which is what all make.
 fn made(map: &EnvironmentMap, samples: u32) -> Execution {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut interpreter = cpu().unwrap();
     run(
         interpreter.as_mut(),
@@ -57,7 +57,7 @@ fn made(map: &EnvironmentMap, samples: u32) -> Execution {
 #[test]
 fn maps_and_tables_are_bit_equal_on_every_backend() {
     let map = EnvironmentMap::of_equirectangular(&picture(128, &sky), 64).unwrap();
-    let (kernels, all) = (KernelLibrary::new(), Capture::EveryPass);
+    let (kernels, all) = (etalon::effects::kernels(), Capture::EveryPass);
     let mut executors = executors();
     let first = run(executors[0].as_mut(), &map, 64, &kernels, all);
     for executor in &mut executors[1..] {
@@ -66,7 +66,7 @@ fn maps_and_tables_are_bit_equal_on_every_backend() {
         assert_eq!(found, None, "{}", executor.info());
     }
     // The comparison must be able to fail: lobes a little too wide.
-    let mut planted = KernelLibrary::new();
+    let mut planted = etalon::effects::kernels();
     let kernel = planted.source("environment/prefilter").unwrap().to_string();
     let changed = kernel.replacen("alpha * alpha", "alpha * 0.26", 1);
     assert_ne!(kernel, changed);

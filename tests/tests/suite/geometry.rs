@@ -5,7 +5,7 @@ use etalon::backend::{Backend, Execution};
 use etalon::effects::geometry::{Geometry, gbuffer, prepass};
 use etalon::graph::Graph;
 use etalon::image::ImageData;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::Capture;
 use etalon_scenes::model::{AlphaMode, Drawable, Model, Snapshot, view};
 use etalon_scenes::trace::{SurfacePoint, TriangleScene, Truth, TruthOptions};
@@ -69,7 +69,7 @@ fn draw(executor: &mut dyn Backend, scene: &Scene, size: FrameSize) -> Execution
     ] {
         graph.output(name, texture).unwrap();
     }
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let plan = plan_for(
         executor,
         &graph,

@@ -8,7 +8,7 @@ use etalon::effects::exposure::Exposure;
 use etalon::effects::{ChainSettings, chain};
 use etalon::graph::{ClearValue, Graph};
 use etalon::image::ImageData;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::{Capture, PlanError};
 use etalon::resource::TextureDesc;
 use etalon_scenes::{Frame, FrameSize, scene};
@@ -17,7 +17,7 @@ use etalon_tests::{executors, first_difference, non_finite, plan_for};
 /// Runs the whole chain twice on every backend, in strict arithmetic, and checks
 /// that all agree and nothing is infinite or NaN.
 fn check(frame: &Frame, settings: &ChainSettings, what: &str) {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let mut reference = Vec::new();
     for executor in &mut executors() {
         let mut graph = Graph::new();
@@ -126,7 +126,7 @@ fn cleared(desc: TextureDesc) -> Graph {
 
 #[test]
 fn impossible_sizes_are_refused_before_anything_is_allocated() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     for executor in &mut executors() {
         let before = executor.counters();
         let limit = executor.limits().max_texture_2d;

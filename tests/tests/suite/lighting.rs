@@ -9,7 +9,7 @@ use etalon::effects::lighting::{LightKind, PunctualLight, Surroundings, lighting
 use etalon::effects::{CameraParams, EffectError};
 use etalon::graph::{Graph, GraphError, Texture};
 use etalon::image::ImageData;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::Capture;
 use etalon::resource::TextureDesc;
 use etalon_tests::{executors, plan_for};
@@ -172,7 +172,7 @@ fn each_light_adds_what_the_model_says() {
             };
             let light = lighting(&mut graph, &scene.view, &surfaces, lights, &around).unwrap();
             graph.output("light", light).unwrap();
-            let kernels = KernelLibrary::new();
+            let kernels = etalon::effects::kernels();
             let (strict, capture) = (Arithmetic::Strict, Capture::Outputs);
             let plan = plan_for(executor.as_ref(), &graph, &kernels, strict, capture).unwrap();
             let execution = executor.execute(&plan, &inputs).unwrap();

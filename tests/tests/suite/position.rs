@@ -6,7 +6,7 @@ use etalon::backend::Backend;
 use etalon::effects::geometry::{Geometry, View, prepass};
 use etalon::effects::{CameraParams, DepthRange};
 use etalon::graph::Graph;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon::plan::Capture;
 use etalon::resource::TextureDesc;
 use etalon_scenes::model::{
@@ -145,7 +145,7 @@ fn errors(executor: &mut dyn Backend, case: &Case) -> (f64, f64) {
         .per_texel("position")
         .unwrap();
     graph.output("position", position).unwrap();
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     kernels.add_source("test/position", KERNEL);
     let strict = Arithmetic::Strict;
     let plan = plan_for(executor, &graph, &kernels, strict, Capture::Outputs).unwrap();

@@ -53,7 +53,7 @@ fn sparse(size: [u32; 2], seed: u32, one_in: u32) -> Frame {
 /// would otherwise find there, if it looked where nothing was written, is what an
 /// earlier picture left.
 fn poison() -> KernelLibrary {
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     for (path, stored) in [
         (
             "ssr/resolve",
@@ -112,7 +112,7 @@ fn tiles_change_no_bit_on_any_backend() {
         ("a row", sparse([301, 1], 9, 40)),
         ("a texel", sparse([1, 1], 10, 1)),
     ];
-    let (kernels, poison) = (KernelLibrary::new(), poison());
+    let (kernels, poison) = (etalon::effects::kernels(), poison());
     for executor in &mut executors() {
         for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {
             for (number, (name, frame)) in scenes.iter().enumerate() {
@@ -144,7 +144,7 @@ fn tiles_change_no_bit_on_any_backend() {
 /// reaches.
 #[test]
 fn a_spread_that_is_too_small_is_seen_on_every_backend() {
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     let source = kernels.source("tiles/spread").unwrap().to_string();
     let short = source.replacen("params.reach, 0)", "params.reach - 1, 0)", 1);
     assert_ne!(source, short);

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use etalon::effects::{EffectEntry, effect, effects};
 use etalon_core::backend::{BackendError, CapturedData};
-use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::{Capture as CaptureWhat, Plan, PlanError, PlanOptions};
 use thiserror::Error;
 
@@ -259,7 +259,7 @@ fn execute(job: &Job) -> Result<Run, ExecuteError> {
     let backend = opened.backend();
     let content = job.source()?.content()?;
     let graph = content.graph(effect)?;
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     if let Some(fault) = &job.plant {
         fault.in_kernels(&mut kernels)?;
     }

@@ -214,7 +214,7 @@ mod tests {
 
     #[test]
     fn a_kernel_that_is_not_there_or_lacks_the_text_is_refused() {
-        let mut kernels = KernelLibrary::new();
+        let mut kernels = etalon::effects::kernels();
         kernels.add_source("test/kernel", "const A = 0.5;");
         let fault: Fault = "constant:test/kernel:0.5:0.25".parse().unwrap();
         fault.in_kernels(&mut kernels).unwrap();

@@ -17,7 +17,6 @@ use etalon::effects::demand::Demands;
 use etalon::effects::frame::{Request, of_images};
 use etalon::graph::{Graph, GraphError};
 use etalon_core::backend::{Backend, BackendError};
-use etalon_core::kernel::KernelLibrary;
 use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_scenes::model::{Shot, ShotError};
 use thiserror::Error;
@@ -140,7 +139,7 @@ fn report(options: &Options) -> Result<Report, PlanCommandError> {
         request.demands = demands(&content)?;
     }
     let graph = graph(&content, options, &request)?;
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let plan_options = PlanOptions {
         arithmetic: options.arithmetic.into(),
         ..PlanOptions::default()
@@ -177,7 +176,7 @@ fn measure(
     content: &Content,
     options: &Options,
 ) -> Result<Result<Measured, BackendError>, PlanCommandError> {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon::effects::kernels();
     let plan_options = PlanOptions {
         arithmetic: options.arithmetic.into(),
         limits: backend.limits(),

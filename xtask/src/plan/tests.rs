@@ -5,7 +5,6 @@ use clap::Parser;
 use etalon::Format;
 use etalon::graph::{ClearValue, Graph};
 use etalon::resource::TextureDesc;
-use etalon_core::kernel::KernelLibrary;
 use etalon_core::plan::{Plan, PlanOptions};
 
 use super::flow::{Edge, edges};
@@ -195,7 +194,7 @@ fn copies() -> Plan {
     let b = graph.copy(a, b).unwrap();
     let c = graph.copy(b, c).unwrap();
     graph.output("<out>", c).unwrap();
-    Plan::new(&graph, &KernelLibrary::new(), &PlanOptions::default()).unwrap()
+    Plan::new(&graph, &etalon::effects::kernels(), &PlanOptions::default()).unwrap()
 }
 
 #[test]

@@ -12,7 +12,6 @@ mod run;
 use std::time::{Duration, Instant};
 
 use etalon_core::backend::BackendError;
-use etalon_core::kernel::KernelLibrary;
 use etalon_core::plan::PlanError;
 use etalon_effects::{EffectEntry, EffectError};
 use etalon_scenes::FrameSize;
@@ -165,7 +164,7 @@ pub fn sweep(
             options,
             done: sweep.clone(),
             executors: &mut executors,
-            kernels: KernelLibrary::new(),
+            kernels: etalon_effects::kernels(),
             effect,
             stage: Stage::new(scene, options.size)?,
             pictures,

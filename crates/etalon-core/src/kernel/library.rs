@@ -1,5 +1,6 @@
 //! The kernels there are, and those compiled so far.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Deref;
@@ -26,31 +27,21 @@ impl Deref for Text {
     }
 }
 
-/// Every file that can be compiled or imported: the embedded ones and those
-/// the user added, which come first.
+/// Every file that can be compiled or imported, by path without extension.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sources {
-    added: BTreeMap<String, Arc<str>>,
+    files: BTreeMap<Cow<'static, str>, Text>,
 }
 
 impl Sources {
     /// The file at a path without extension.
     pub(super) fn get(&self, path: &str) -> Option<Text> {
-        match self.added.get(path) {
-            Some(text) => Some(Text::Added(text.clone())),
-            None => etalon_shaders::source(path).map(Text::Embedded),
-        }
+        self.files.get(path).cloned()
     }
 
     /// All paths, sorted.
     pub(super) fn paths(&self) -> Vec<&str> {
-        let embedded = etalon_shaders::sources().map(|(path, _)| path);
-        let mut paths: Vec<&str> = embedded
-            .chain(self.added.keys().map(String::as_str))
-            .collect();
-        paths.sort_unstable();
-        paths.dedup();
-        paths
+        self.files.keys().map(Cow::as_ref).collect()
     }
 }
 
@@ -109,7 +100,7 @@ pub struct KernelLibrary {
 impl fmt::Debug for KernelLibrary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("KernelLibrary")
-            .field("added", &self.sources.added.keys())
+            .field("files", &self.sources.paths())
             .field("stats", &self.stats())
             .finish_non_exhaustive()
     }
@@ -122,19 +113,36 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl KernelLibrary {
-    /// A library of the embedded kernels.
+    /// A library without files. One of the kernels of Etalon's effects is made by
+    /// `etalon::effects::kernels()`.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
+    /// A library of files that are part of the program, as (path, text). Of two with
+    /// one path the later counts.
+    #[must_use]
+    pub fn of(files: impl IntoIterator<Item = (&'static str, &'static str)>) -> Self {
+        let files = files
+            .into_iter()
+            .map(|(path, text)| (Cow::Borrowed(path), Text::Embedded(text)));
+        Self {
+            sources: Sources {
+                files: files.collect(),
+            },
+            ..Self::default()
+        }
+    }
+
     /// Adds a file, which may be a kernel or be imported by kernels as
     /// `package::my_effect::blur::…` for the path `my_effect/blur`.
     ///
-    /// A file of the same path is replaced, embedded or not; kernels compiled
-    /// before are forgotten, since they may have imported it.
+    /// A file of the same path is replaced; kernels compiled before are forgotten,
+    /// since they may have imported it.
     pub fn add_source(&mut self, path: &str, wesl: &str) {
-        self.sources.added.insert(path.to_owned(), wesl.into());
+        let text = Text::Added(wesl.into());
+        self.sources.files.insert(path.to_owned().into(), text);
         lock(&self.state).slots.clear();
     }
 

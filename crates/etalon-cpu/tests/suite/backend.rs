@@ -307,7 +307,7 @@ fn what_goes_wrong_is_said_and_leaves_the_backend_usable() {
 /// Every kernel that is shipped, in both arithmetics.
 #[test]
 fn shipped_kernels_translate() {
-    let library = KernelLibrary::new();
+    let library = etalon_effects::kernels();
     let paths = [
         "bloom/upsample",
         "bloom/downsample",

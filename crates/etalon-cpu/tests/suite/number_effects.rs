@@ -2,7 +2,7 @@
 
 use etalon_core::backend::{Backend, Execution};
 use etalon_core::graph::Graph;
-use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::{Capture, Plan, PlanOptions};
 use etalon_cpu::{CpuBackend, CpuOptions, NumberType, Tier, WideCapture, WideExecution};
 use etalon_effects::registry::{EffectEntry, effects};
@@ -29,7 +29,7 @@ fn plan(backend: &CpuBackend, frame: &Frame, effect: &EffectEntry, arithmetic: A
         capture: Capture::EveryPass,
         memory: backend.memory(),
     };
-    Plan::new(&graph, &KernelLibrary::new(), &options).unwrap()
+    Plan::new(&graph, &etalon_effects::kernels(), &options).unwrap()
 }
 
 /// Two frames, so that histories take part.

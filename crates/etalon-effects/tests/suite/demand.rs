@@ -220,7 +220,7 @@ fn an_absent_effect_is_not_in_the_plan() {
         ),
         (Demands::everything(), full),
     ] {
-        let (kernels, reference_kernels) = (KernelLibrary::new(), KernelLibrary::new());
+        let (kernels, reference_kernels) = (etalon_effects::kernels(), etalon_effects::kernels());
         let mut graph = Graph::new();
         let images = inputs(&mut graph, 64, 48);
         let request = Request {
@@ -252,7 +252,7 @@ fn an_absent_effect_is_not_in_the_plan() {
 
 #[test]
 fn mirrors_that_are_perfectly_smooth_are_not_blurred() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let names = |roughest: f32| {
         let mut graph = Graph::new();
         let images = inputs(&mut graph, 64, 48);
@@ -272,7 +272,7 @@ fn mirrors_that_are_perfectly_smooth_are_not_blurred() {
 
 #[test]
 fn only_what_is_asked_for_is_output() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut graph = Graph::new();
     let images = inputs(&mut graph, 64, 48);
     let mut outputs = Outputs::NONE;
@@ -458,7 +458,7 @@ fn regions_are_cut_at_the_screen() {
 /// that is alive at once.
 #[test]
 fn transient_memory_is_within_a_quarter_of_the_least() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut all: Vec<(String, ChainSettings)> = Quality::ALL
         .map(|quality| (quality.to_string(), ChainSettings::preset(quality)))
         .to_vec();

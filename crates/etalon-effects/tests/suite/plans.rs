@@ -51,7 +51,7 @@ const BOTH: [Arithmetic; 2] = [Arithmetic::Strict, Arithmetic::Fast];
 
 #[test]
 fn every_registered_effect_plans_strict_and_fast() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     for entry in effects() {
         for (width, height) in [(64, 48), (1, 1), (1, 37), (4096, 1), (31, 17)] {
             let mut graph = Graph::new();
@@ -68,7 +68,7 @@ fn every_registered_effect_plans_strict_and_fast() {
 
 #[test]
 fn every_variant_of_every_kernel_plans_strict_and_fast() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut all = Vec::new();
     for curve in ToneCurve::ALL {
         all.push(ChainSettings {
@@ -123,7 +123,7 @@ fn every_variant_of_every_kernel_plans_strict_and_fast() {
 
 #[test]
 fn an_effect_that_is_off_leaves_nothing_behind() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut graph = Graph::new();
     let inputs = inputs(&mut graph, 64, 48);
     let result = chain(&mut graph, &inputs, &ChainSettings::default()).expect("valid settings");
@@ -155,7 +155,7 @@ fn a_resolution_of_zero_is_off() {
 
 #[test]
 fn the_chain_runs_its_passes_in_order() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     let mut graph = Graph::new();
     let inputs = inputs(&mut graph, 64, 48);
     let settings = ChainSettings {
@@ -198,7 +198,7 @@ fn the_chain_runs_its_passes_in_order() {
 
 #[test]
 fn bloom_stops_halving_at_one_texel() {
-    let kernels = KernelLibrary::new();
+    let kernels = etalon_effects::kernels();
     // Sizes per level: 5×1 → 3×1 → 2×1 → 1×1, so three levels at most.
     let mut graph = Graph::new();
     let inputs = inputs(&mut graph, 5, 1);

@@ -4,7 +4,6 @@ mod conclude;
 mod pair;
 
 use etalon_core::backend::BackendError;
-use etalon_core::kernel::KernelLibrary;
 use etalon_effects::{EffectEntry, effect, effects};
 use etalon_scenes::cases::case;
 use thiserror::Error;
@@ -119,7 +118,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
     let mut watch = Watch::new()?;
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon_effects::kernels();
     for (path, text) in &options.kernels {
         kernels.add_source(path, text);
     }

@@ -2,7 +2,7 @@
 
 use etalon::backend::Execution;
 use etalon::effects::forward::lamp_bytes;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon_scenes::FrameSize;
 use etalon_tests::executors;
 use glam::DVec3;
@@ -32,7 +32,7 @@ fn light_as_drawn_is_that_of_the_light_map() {
 fn a_light_map_of_other_light_is_told_apart() {
     let size = FrameSize::new(100, 56).unwrap();
     let scene = &scenes(size)[0];
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon::effects::kernels();
     let shade = kernels.source("forward/shade").unwrap().to_string();
     let changed = shade.replacen(
         "seen.emission + scattered +",

@@ -8,7 +8,7 @@ mod white;
 
 use etalon::backend::Execution;
 use etalon::effects::forward::lamp_bytes;
-use etalon::kernel::{Arithmetic, KernelLibrary};
+use etalon::kernel::Arithmetic;
 use etalon_scenes::{FrameSize, models};
 use etalon_tests::{executors, non_finite};
 use glam::DVec3;
@@ -130,7 +130,7 @@ fn fast_kernels_light_alike() {
             lamps: &scene.lamps,
             bytes: &bytes,
             arithmetic: Arithmetic::Fast,
-            kernels: &KernelLibrary::new(),
+            kernels: &etalon::effects::kernels(),
         };
         let worst = worst(&expected, &scene.draw_with(executor.as_mut(), &with));
         assert!(worst <= 1.0, "{worst} on {}", executor.info());
@@ -170,7 +170,7 @@ fn no_lamp_makes_light_that_is_no_number() {
                 lamps: &scene.lamps,
                 bytes: &bytes,
                 arithmetic,
-                kernels: &KernelLibrary::new(),
+                kernels: &etalon::effects::kernels(),
             };
             let drawn = scene.draw_with(executor.as_mut(), &with);
             let who = format!("{pattern:x} on {}", executor.info());

@@ -113,7 +113,7 @@ impl Scene {
             lamps,
             bytes: &bytes,
             arithmetic: Arithmetic::Strict,
-            kernels: &KernelLibrary::new(),
+            kernels: &etalon::effects::kernels(),
         };
         self.draw_with(executor, &with)
     }

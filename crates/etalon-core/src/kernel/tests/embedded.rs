@@ -18,7 +18,7 @@ fn kernels(library: &KernelLibrary) -> Vec<String> {
 
 #[test]
 fn every_kernel_compiles_in_both_arithmetics() {
-    let library = KernelLibrary::new();
+    let library = KernelLibrary::of(etalon_shaders::sources());
     for path in kernels(&library) {
         for arithmetic in [Arithmetic::Strict, Arithmetic::Fast] {
             let kernel = library
@@ -34,7 +34,7 @@ fn every_kernel_compiles_in_both_arithmetics() {
 /// module begins with the same word in the generated text and in the file.
 #[test]
 fn every_expression_leads_back_to_its_own_text() {
-    let library = KernelLibrary::new();
+    let library = KernelLibrary::of(etalon_shaders::sources());
     for path in kernels(&library) {
         let kernel = library
             .get(&KernelRequest::new(path.clone()), Arithmetic::Strict)

@@ -1,7 +1,7 @@
 //! Things to be drawn, and plans of draws.
 
 use etalon_core::graph::Graph;
-use etalon_core::kernel::{Arithmetic, KernelLibrary};
+use etalon_core::kernel::Arithmetic;
 use etalon_core::plan::{Plan, PlanOptions, RasterStep, Step};
 use etalon_core::raster::{IndexFormat, StepMode, VertexAttribute, VertexFormat, VertexLayout};
 use etalon_core::resource::BufferDesc;
@@ -66,7 +66,7 @@ pub(crate) fn plan(graph: &Graph, arithmetic: Arithmetic) -> Plan {
         arithmetic,
         ..PlanOptions::default()
     };
-    Plan::new(graph, &KernelLibrary::new(), &options).unwrap_or_else(|error| panic!("{error}"))
+    Plan::new(graph, &etalon_effects::kernels(), &options).unwrap_or_else(|error| panic!("{error}"))
 }
 
 pub(crate) fn raster(plan: &Plan, step: usize) -> &RasterStep {

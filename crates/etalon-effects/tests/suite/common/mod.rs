@@ -69,7 +69,7 @@ impl<'a> Run<'a> {
         Self {
             graph: Graph::new(),
             inputs: Inputs::new(),
-            kernels: KernelLibrary::new(),
+            kernels: etalon_effects::kernels(),
             arithmetic: Arithmetic::Strict,
         }
     }

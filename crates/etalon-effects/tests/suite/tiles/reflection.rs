@@ -46,7 +46,7 @@ fn sparse(seed: u32, one_in: u32) -> Mask {
 /// would otherwise find there, if it looked where nothing was written, is what an
 /// earlier picture left.
 fn poison() -> KernelLibrary {
-    let mut kernels = KernelLibrary::new();
+    let mut kernels = etalon_effects::kernels();
     for (path, stored) in [
         ("ssr/march", "textureStore(result, texel, found)"),
         (
@@ -80,7 +80,7 @@ impl Bench {
 
     fn with(arithmetic: Arithmetic, options: CpuOptions) -> Self {
         Self {
-            kernels: KernelLibrary::new(),
+            kernels: etalon_effects::kernels(),
             poison: poison(),
             backend: CpuBackend::new(&options).unwrap(),
             arithmetic,

@@ -243,7 +243,7 @@ fn what_the_screen_does_not_call_for_costs_nothing_and_changes_nothing() {
 
 /// Of chains that begin with geometry, by every backend's own idea of memory.
 #[test]
-fn transient_memory_of_drawn_frames_is_within_half_of_the_least() {
+fn transient_memory_of_drawn_frames_is_within_a_tenth_of_the_least() {
     use etalon::effects::demand::Outputs;
     use etalon::effects::frame::Shading;
     use etalon_scenes::models;
@@ -276,10 +276,8 @@ fn transient_memory_of_drawn_frames_is_within_half_of_the_least() {
                         .unwrap();
                         let memory = plan.transient_memory();
                         worst = worst.max(memory.excess());
-                        // Of small frames alignment, and the heap that buffers have for
-                        // themselves, are a large part.
                         assert!(
-                            memory.excess() <= 0.5 || memory.planned < 1 << 20,
+                            memory.excess() <= 0.1,
                             "{}, {width}×{height}, {shading:?}, {outputs:?}, {}: {memory:?}",
                             entry.name,
                             executor.info()

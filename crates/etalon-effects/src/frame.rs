@@ -91,6 +91,14 @@ impl Request {
             let reason = "all that mirrors is perfectly smooth";
             graph.decide("ssr/blur", Decision::absent(reason));
         }
+        if let Some(reason) = ssr::demand::other_rate(&asked, &suited, &self.demands) {
+            let decision = if suited.quarter_from == 0.0 {
+                Decision::runs(reason)
+            } else {
+                Decision::absent(reason)
+            };
+            graph.decide("ssr/quarter", decision);
+        }
         if suited.tiles != asked.tiles {
             let reason = "so much of the screen mirrors that tiles would cost more than they save";
             graph.decide("ssr/classify", Decision::absent(reason));

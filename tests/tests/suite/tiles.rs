@@ -119,6 +119,7 @@ fn tiles_change_no_bit_on_any_backend() {
                 let settings = Ssr {
                     resolution: 0.25,
                     blur_radius: [6, 9, 0][number % 3],
+                    quarter_from: [2.0, 0.5, 0.0][number / 3 % 3],
                     ..Ssr::default()
                 };
                 let mut on = |kernels: &KernelLibrary, tiles| {

@@ -98,6 +98,9 @@ pub struct Options {
     /// Reflect nothing unless something mirrors more of a colour than this
     #[arg(long, value_name = "0..1", default_value_t = Thresholds::default().min_specular)]
     pub min_specular: f32,
+    /// March one texel in four unless something mirrors more of a colour than this
+    #[arg(long, value_name = "0..1", default_value_t = Thresholds::default().faint_specular)]
+    pub faint_specular: f32,
     /// Plan as if anything could be anywhere on the screen
     #[arg(long)]
     pub everything: bool,
@@ -195,6 +198,7 @@ impl Options {
         Thresholds {
             max_roughness: self.max_roughness,
             min_specular: self.min_specular,
+            faint_specular: self.faint_specular,
             ..Thresholds::default()
         }
     }

@@ -257,6 +257,9 @@ pub struct Thresholds {
     /// Share of a colour up to which mirroring is not worth it, in `[0, 1]`; 0 leaves
     /// out only what does not mirror.
     pub min_specular: f32,
+    /// Share of a colour up to which reflections are faint, in `[0, 1]`: if no surface
+    /// mirrors more, one texel in four is marched. 0 does that to none.
+    pub faint_specular: f32,
     /// What reflections take on the device, on tiles and without, as `cargo xtask
     /// economy` measures it: where what mirrors covers more of the screen than tiles
     /// are worth, they are off. For bounds that are tight; `None` leaves it to
@@ -270,6 +273,7 @@ impl Default for Thresholds {
         Self {
             max_roughness: 1.0,
             min_specular: 0.0,
+            faint_specular: 0.0,
             tiles: None,
         }
     }
@@ -283,7 +287,8 @@ impl Thresholds {
     pub fn validate(&self) -> Result<(), SettingError> {
         let check = Settings("thresholds");
         check.range("max_roughness", self.max_roughness, 0.0, 1.0)?;
-        check.range("min_specular", self.min_specular, 0.0, 1.0)
+        check.range("min_specular", self.min_specular, 0.0, 1.0)?;
+        check.range("faint_specular", self.faint_specular, 0.0, 1.0)
     }
 }
 

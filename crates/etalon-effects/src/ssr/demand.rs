@@ -3,7 +3,7 @@
 use etalon_core::graph::Decision;
 
 use super::{Blend, Ssr};
-use crate::demand::{Calls, Demands, Need, Thresholds, off, unseen};
+use crate::demand::{Calls, Demands, Need, Reflective, Thresholds, off, unseen};
 
 /// What the march and the mix read.
 pub(crate) const NEEDS: &[Need] = &[Need::Depth, Need::Normal, Need::Specular];
@@ -43,8 +43,10 @@ pub(crate) fn decide(calls: &Calls<'_>) -> Decision {
 }
 
 /// The settings without what nothing on screen calls for: where all that mirrors is
-/// perfectly smooth, the blur has no share in the mix; and where most of the screen
-/// mirrors, tiles save less than they cost.
+/// perfectly smooth, the blur has no share in the mix; where nothing is as rough as what
+/// is marched at a quarter of the rate, or nothing smoother, there is one rate; and where
+/// most of the screen mirrors, tiles save less than they cost. The picture stays the same
+/// but where reflections are [faint](Thresholds::faint_specular).
 pub(crate) fn suited(settings: &Ssr, demands: &Demands, thresholds: &Thresholds) -> Ssr {
     let Some(reflective) = demands.reflective else {
         return *settings;
@@ -52,12 +54,47 @@ pub(crate) fn suited(settings: &Ssr, demands: &Demands, thresholds: &Thresholds)
     let rough = reflective.roughness[1] > 0.0;
     let suited = Ssr {
         blur_radius: if rough { settings.blur_radius } else { 0 },
+        quarter_from: quarter_from(settings, &reflective, thresholds),
         ..*settings
     };
     match &thresholds.tiles {
         Some(cost) => suited.for_coverage(reflective.region.coverage().into(), cost),
         None => suited,
     }
+}
+
+/// The roughness from which one texel in four is marched.
+fn quarter_from(settings: &Ssr, reflective: &Reflective, thresholds: &Thresholds) -> f32 {
+    // Specular maps of 8 bits round a roughness by half of this.
+    const STEP: f32 = 1.0 / 255.0;
+    let [smoothest, roughest] = reflective.roughness;
+    let limit = settings.quarter_from;
+    if reflective.specular <= thresholds.faint_specular || smoothest >= limit + STEP {
+        0.0
+    } else if roughest <= limit - STEP {
+        Ssr::NO_QUARTER
+    } else {
+        limit
+    }
+}
+
+/// Why [`suited`] settings march at another rate than was asked for, if they do.
+pub(crate) fn other_rate(asked: &Ssr, suited: &Ssr, demands: &Demands) -> Option<String> {
+    let reflective = demands.reflective?;
+    let [smoothest, roughest] = reflective.roughness;
+    if asked.quarter_from == suited.quarter_from {
+        return None;
+    }
+    Some(if suited.quarter_from != 0.0 {
+        format!("nothing that mirrors is rougher than {roughest}: every texel is marched")
+    } else if smoothest < asked.quarter_from {
+        format!(
+            "no surface mirrors more than {} of a colour: one texel in four is marched",
+            reflective.specular
+        )
+    } else {
+        format!("nothing that mirrors is smoother than {smoothest}: one texel in four is marched")
+    })
 }
 
 /// How many times brighter than the brightest light reflections can make a texel:

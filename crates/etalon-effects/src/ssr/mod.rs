@@ -4,7 +4,7 @@
 //! ([`march`]); colours are looked up there afterwards ([`resolve`]), blurred
 //! for rough surfaces ([`blur`]) and laid onto the scene by its specular map
 //! ([`mix`]). [`ssr`] does all four, by default only on [tiles](crate::tiles) that show
-//! something mirrored.
+//! something mirrored, and if asked to at a quarter of the rate where surfaces are rough.
 //!
 //! Only what the screen shows can be reflected: what lies outside of it, behind
 //! something, or faces away is not there to be found. The fades of [`Ssr`] let
@@ -19,6 +19,7 @@
 
 pub(crate) mod demand;
 mod passes;
+mod quarter;
 mod tiled;
 pub mod truth;
 
@@ -28,8 +29,8 @@ use etalon_core::graph::{Graph, Texture};
 pub use passes::{blur, march, mix, resolve};
 
 use crate::knob::{Tunable, choices, knobs};
-use crate::tiles::Tiling;
 use crate::tiles::crossover::Cost;
+use crate::tiles::{Area, Tiling};
 use crate::{EffectError, SceneInputs, SettingError};
 
 /// How the screen is searched along a ray.
@@ -130,6 +131,12 @@ pub struct Ssr {
     pub blur_radius: u32,
     /// What places and lengths of reflections are stored in.
     pub storage: HitStorage,
+    /// Roughness from which on only one texel in four is marched, in `[0, 2]`: 0 is all
+    /// surfaces, over 1 none. The others are given what was found for their own surface
+    /// next to them. Rough surfaces, whose reflections are blurred, hide that; on smooth
+    /// ones thin things and outlines in reflections show it. A quarter of the cost of the
+    /// search and of the blur, where all of a tile is that rough.
+    pub quarter_from: f32,
     /// How the reflection is put onto the scene.
     pub blend: Blend,
     /// Into which tiles the picture is divided, of which those are left out that show
@@ -152,6 +159,7 @@ knobs!(Ssr, "ssr" {
     real border [0.0, 0.5] "", Look [0.0, 0.1, 0.25], "width of the band along the edges in which reflections fade out";
     count blur_radius [0, 64] "texels", Look [0, 2, 6, 16], "reach of the blur on rough surfaces";
     choice storage [HitStorage] "", Accuracy ["rgba16float", "rgba32float"], "what places of reflections are stored in";
+    real quarter_from [0.0, 2.0] "", Accuracy [0.0, 0.25, 0.5, 0.75, 2.0], "roughness from which one texel in four is marched";
     choice blend [Blend] "", Look ["add", "replace"], "how the reflection is put onto the scene";
     choice tiles [Tiling] "texels", Cost ["off", "8", "16", "32", "64"], "side of the tiles of which those that show nothing mirrored are left out";
 });
@@ -171,6 +179,7 @@ impl Default for Ssr {
             border: 0.1,
             blur_radius: 6,
             storage: HitStorage::Full,
+            quarter_from: Self::NO_QUARTER,
             blend: Blend::Add,
             tiles: Tiling::Texels8,
         }
@@ -178,6 +187,9 @@ impl Default for Ssr {
 }
 
 impl Ssr {
+    /// [`Ssr::quarter_from`] that leaves every texel to be marched.
+    pub const NO_QUARTER: f32 = 2.0;
+
     /// Checks every field against its range.
     ///
     /// # Errors
@@ -217,14 +229,28 @@ pub fn ssr(
     if settings.resolution == 0.0 {
         return Ok(inputs.colour);
     }
-    match settings.tiles.size() {
-        Some(size) => tiled::ssr(graph, inputs, settings, size),
-        None => full(graph, inputs, settings),
+    let limit = settings.quarter_from;
+    if limit == 0.0 {
+        return quarter::ssr(graph, inputs, settings, None);
+    }
+    let smoother = Some(limit).filter(|limit| *limit <= 1.0);
+    let result = match settings.tiles.size() {
+        Some(size) => tiled::ssr(graph, inputs, settings, smoother, size)?,
+        None => full(graph, inputs, settings, smoother)?,
+    };
+    match smoother {
+        Some(_) => quarter::ssr(graph, inputs, settings, Some(result)),
+        None => Ok(result),
     }
 }
 
-/// Every pass on the whole picture.
-fn full(graph: &mut Graph, inputs: &SceneInputs, settings: &Ssr) -> Result<Texture, EffectError> {
+/// Every pass on the whole picture, for surfaces of less than some roughness.
+fn full(
+    graph: &mut Graph,
+    inputs: &SceneInputs,
+    settings: &Ssr,
+    smoother: Option<f32>,
+) -> Result<Texture, EffectError> {
     let reflection = march(graph, inputs.depth, inputs.normal, &inputs.camera, settings)?;
     let sharp = resolve(graph, reflection, inputs.colour)?;
     let blurred = if settings.blur_radius > 0 {
@@ -232,12 +258,13 @@ fn full(graph: &mut Graph, inputs: &SceneInputs, settings: &Ssr) -> Result<Textu
     } else {
         None
     };
-    mix(
-        graph,
-        inputs.colour,
-        inputs.specular,
+    let layers = passes::Layers {
+        colour: inputs.colour,
+        specular: inputs.specular,
         sharp,
         blurred,
-        settings.blend,
-    )
+        smoother,
+    };
+    let result = layers.result(graph)?;
+    layers.mix(graph, settings.blend, result, Area::Picture, "ssr/mix")
 }

@@ -10,6 +10,25 @@ use crate::check::{Settings, same_size, size};
 use crate::scene::CameraParams;
 use crate::tiles::{Area, Axis};
 
+/// Which pixels are marched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rate {
+    /// Every one.
+    Full,
+    /// One in four: what comes of it has half the size, and its texel i is of pixel 2i.
+    Quarter,
+}
+
+impl Rate {
+    /// The name of a pass at this rate.
+    fn named(self, name: &str) -> String {
+        match self {
+            Self::Full => name.to_owned(),
+            Self::Quarter => format!("{name} quarter"),
+        }
+    }
+}
+
 /// A texture the size of `like`, of another format.
 fn texture(graph: &mut Graph, name: &str, like: Texture, format: Format) -> Texture {
     let extent = graph.desc(like).extent;
@@ -31,7 +50,15 @@ pub fn march(
     camera: &CameraParams,
     settings: &Ssr,
 ) -> Result<Texture, EffectError> {
-    march_on(graph, depth, normal, camera, settings, Area::Picture)
+    march_on(
+        graph,
+        depth,
+        normal,
+        camera,
+        settings,
+        Rate::Full,
+        Area::Picture,
+    )
 }
 
 /// [`march`] where it is asked for.
@@ -41,6 +68,7 @@ pub(super) fn march_on(
     normal: Texture,
     camera: &CameraParams,
     settings: &Ssr,
+    rate: Rate,
     area: Area,
 ) -> Result<Texture, EffectError> {
     settings.validate()?;
@@ -52,9 +80,16 @@ pub(super) fn march_on(
         ("depth", size(graph, depth)),
         ("normal", size(graph, normal)),
     )?;
-    let result = texture(graph, "ssr.reflection", depth, settings.storage.format());
+    let [width, height] = match rate {
+        Rate::Full => size(graph, depth),
+        Rate::Quarter => size(graph, depth).map(|side| side.div_ceil(2)),
+    };
+    let desc = TextureDesc::d2(width, height, settings.storage.format());
+    let result = graph.texture("ssr.reflection", desc);
     let pass = graph
         .compute("ssr/march")
+        .named(rate.named("ssr/march"))
+        .feature("quarter", rate == Rate::Quarter)
         .read("depth", depth)
         .read("normal", normal)
         .feature("half", settings.storage == HitStorage::Half);
@@ -88,7 +123,7 @@ pub fn resolve(
     reflection: Texture,
     colour: Texture,
 ) -> Result<Texture, EffectError> {
-    resolve_on(graph, reflection, colour, Area::Picture)
+    resolve_on(graph, reflection, colour, Rate::Full, Area::Picture)
 }
 
 /// [`resolve`] where it is asked for.
@@ -96,11 +131,13 @@ pub(super) fn resolve_on(
     graph: &mut Graph,
     reflection: Texture,
     colour: Texture,
+    rate: Rate,
     area: Area,
 ) -> Result<Texture, EffectError> {
     let result = texture(graph, "ssr.sharp", reflection, Format::Rgba16Float);
     let pass = graph
         .compute("ssr/resolve")
+        .named(rate.named("ssr/resolve"))
         .read("reflection", reflection)
         .read("source", colour);
     area.run(pass, result)
@@ -113,32 +150,35 @@ pub(super) fn resolve_on(
 /// # Errors
 /// If the radius is over 64.
 pub fn blur(graph: &mut Graph, source: Texture, radius: u32) -> Result<Texture, EffectError> {
-    let across = blur_along(graph, source, radius, Axis::X, Area::Picture)?;
-    blur_along(graph, across, radius, Axis::Y, Area::Picture)
+    blur_on(graph, source, radius, Rate::Full, [Area::Picture; 2])
 }
 
-/// One of the passes of [`blur`], where it is asked for.
-pub(super) fn blur_along(
+/// [`blur`] of what was marched at a rate, each pass where it is asked for.
+pub(super) fn blur_on(
     graph: &mut Graph,
     source: Texture,
     radius: u32,
-    axis: Axis,
-    area: Area,
+    rate: Rate,
+    [around, area]: [Area; 2],
 ) -> Result<Texture, EffectError> {
     Settings("ssr").count("blur_radius", radius, 0, 64)?;
-    let name = match axis {
-        Axis::X => "x",
-        Axis::Y => "y",
+    let mut along = |source, axis: Axis, name: &str, area: Area| {
+        let result = texture(
+            graph,
+            &format!("ssr.blurred {name}"),
+            source,
+            Format::Rgba16Float,
+        );
+        let pass = graph
+            .compute("ssr/blur")
+            .named(rate.named(&format!("ssr/blur {name}")))
+            .read("source", source)
+            .set("axis", axis.step())
+            .set("radius", radius as i32);
+        area.run(pass, result)
     };
-    let result = format!("ssr.blurred {name}");
-    let result = texture(graph, &result, source, Format::Rgba16Float);
-    let pass = graph
-        .compute("ssr/blur")
-        .named(format!("ssr/blur {name}"))
-        .read("source", source)
-        .set("axis", axis.step())
-        .set("radius", radius as i32);
-    area.run(pass, result)
+    let across = along(source, Axis::X, "x", around)?;
+    along(across, Axis::Y, "y", area)
 }
 
 /// Puts reflections onto the scene: of each colour what the specular map says,
@@ -162,9 +202,15 @@ pub fn mix(
         specular,
         sharp,
         blurred,
+        smoother: None,
     };
     let result = layers.result(graph)?;
     layers.mix(graph, blend, result, Area::Picture, "ssr/mix")
+}
+
+/// A texture for a result that is laid over a picture.
+pub(super) fn result_over(graph: &mut Graph, colour: Texture) -> Texture {
+    texture(graph, "ssr.result", colour, Format::Rgba16Float)
 }
 
 /// What [`mix`] puts together.
@@ -174,6 +220,8 @@ pub(super) struct Layers {
     pub(super) specular: Texture,
     pub(super) sharp: Texture,
     pub(super) blurred: Option<Texture>,
+    /// Surfaces of at least this roughness are left as they are.
+    pub(super) smoother: Option<f32>,
 }
 
 impl Layers {
@@ -189,12 +237,7 @@ impl Layers {
                 same_size("ssr", picture, (name, size(graph, input)))?;
             }
         }
-        Ok(texture(
-            graph,
-            "ssr.result",
-            self.colour,
-            Format::Rgba16Float,
-        ))
+        Ok(result_over(graph, self.colour))
     }
 
     /// [`mix`] where it is asked for, in a pass of some name.
@@ -216,6 +259,9 @@ impl Layers {
             .constant("ADD", f64::from(u8::from(blend == Blend::Add)));
         if let Some(blurred) = self.blurred {
             pass = pass.read("blurred", blurred);
+        }
+        if let Some(limit) = self.smoother {
+            pass = pass.feature("smoother", true).set("quarter_from", limit);
         }
         area.run(pass, result)
     }

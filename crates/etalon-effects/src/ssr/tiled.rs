@@ -7,7 +7,7 @@
 use etalon_core::graph::{Graph, Texture};
 
 use super::Ssr;
-use super::passes::{Layers, blur_along, march_on, resolve_on};
+use super::passes::{Layers, Rate, blur_on, march_on, resolve_on};
 use crate::tiles::{Area, Axis, Marks, TileSize};
 use crate::{EffectError, SceneInputs};
 
@@ -20,15 +20,16 @@ const BLURRED: u32 = 4;
 /// The blur along rows reads reflections here.
 const REFLECTED: u32 = 8;
 
-/// As [`super::ssr`], whose picture it gives bit for bit.
+/// As [`super::full`], whose picture it gives bit for bit.
 pub(super) fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
     settings: &Ssr,
+    smoother: Option<f32>,
     tiles: TileSize,
 ) -> Result<Texture, EffectError> {
     let radius = settings.blur_radius;
-    let mut marks = classify(graph, inputs.specular, radius > 0, tiles)?;
+    let mut marks = classify(graph, inputs.specular, radius > 0, smoother, tiles)?;
     if radius > 0 {
         marks = marks
             .spread(graph, Axis::Y, radius, ROUGH, BLURRED)?
@@ -42,22 +43,23 @@ pub(super) fn ssr(
         inputs.normal,
         &inputs.camera,
         settings,
+        Rate::Full,
         found,
     )?;
-    let sharp = resolve_on(graph, reflection, inputs.colour, found)?;
+    let sharp = resolve_on(graph, reflection, inputs.colour, Rate::Full, found)?;
 
     let layers = Layers {
         colour: inputs.colour,
         specular: inputs.specular,
         sharp,
         blurred: None,
+        smoother,
     };
     let mut result = layers.result(graph)?;
     if radius > 0 {
         let around = Area::Tiles(marks.with(graph, BLURRED)?);
         let rough = Area::Tiles(marks.with(graph, ROUGH)?);
-        let across = blur_along(graph, sharp, radius, Axis::X, around)?;
-        let blurred = blur_along(graph, across, radius, Axis::Y, rough)?;
+        let blurred = blur_on(graph, sharp, radius, Rate::Full, [around, rough])?;
         let layers = Layers {
             blurred: Some(blurred),
             ..layers
@@ -67,23 +69,37 @@ pub(super) fn ssr(
     let smooth = Area::Tiles(marks.with(graph, SMOOTH)?);
     result = layers.mix(graph, settings.blend, result, smooth, "ssr/mix smooth")?;
     let others = Area::Tiles(marks.without(graph, SMOOTH | ROUGH)?);
-    let pass = graph.compute("ssr/keep").read("source", inputs.colour);
-    others.run(pass, result)
+    keep(graph, inputs.colour, result, others)
 }
 
-/// What each tile asks for.
+/// Copies light where nothing is mirrored.
+pub(super) fn keep(
+    graph: &mut Graph,
+    colour: Texture,
+    result: Texture,
+    area: Area,
+) -> Result<Texture, EffectError> {
+    let pass = graph.compute("ssr/keep").read("source", colour);
+    area.run(pass, result)
+}
+
+/// What each tile asks for, of surfaces of less than some roughness.
 fn classify(
     graph: &mut Graph,
     specular: Texture,
     blurred: bool,
+    smoother: Option<f32>,
     tiles: TileSize,
 ) -> Result<Marks, EffectError> {
     let marks = Marks::texture(graph, "ssr.marks", specular);
-    let marks = graph
+    let mut pass = graph
         .compute("ssr/classify")
         .read("specular", specular)
         .write("result", marks)
-        .feature("blurred", blurred)
-        .per_texel("result")?;
+        .feature("blurred", blurred);
+    if let Some(limit) = smoother {
+        pass = pass.feature("smoother", true).set("quarter_from", limit);
+    }
+    let marks = pass.per_texel("result")?;
     Marks::of(graph, marks, tiles)
 }

@@ -132,6 +132,22 @@ impl Marks {
         graph.texture(name, TextureDesc::d2(width, height, Format::R32Uint))
     }
 
+    /// The same for a picture of half the size, rounded up.
+    pub fn half_texture(graph: &mut Graph, name: &str, picture: Texture) -> Texture {
+        let side = 2 * MARKED_SIDE;
+        let [width, height] = size(graph, picture).map(|texels| texels.div_ceil(side));
+        graph.texture(name, TextureDesc::d2(width, height, Format::R32Uint))
+    }
+
+    /// These marks for the picture of twice the size, whose tiles are twice as wide.
+    #[must_use]
+    pub const fn doubled(self) -> Self {
+        let size = TileSize {
+            shift: self.size.shift + 1,
+        };
+        Self { size, ..self }
+    }
+
     /// The marks in a texture that [`Marks::texture`] made and a kernel wrote, joined for
     /// tiles of some size: the larger of two marks is kept.
     ///

@@ -28,6 +28,7 @@ pub(crate) const PLAIN_SSR: Ssr = Ssr {
     border: 0.0,
     blur_radius: 0,
     storage: HitStorage::Full,
+    quarter_from: Ssr::NO_QUARTER,
     blend: Blend::Add,
     tiles: Tiling::Off,
 };

@@ -2,4 +2,5 @@
 //! tiles against their definition.
 
 mod lists;
+mod quarter;
 mod reflection;

@@ -13,25 +13,25 @@ use etalon_scenes::{Frame, FrameSize, scene};
 use crate::common::{Run, hash, image};
 
 /// Which texels mirror, and how rough they are.
-type Mask = Box<dyn Fn(u32, u32) -> [f32; 4]>;
+pub(super) type Mask = Box<dyn Fn(u32, u32) -> [f32; 4]>;
 
-const ROUGH: [f32; 4] = [0.6, 0.8, 1.0, 0.25];
-const SMOOTH: [f32; 4] = [1.0, 0.7, 0.2, 1.0];
+pub(super) const ROUGH: [f32; 4] = [0.6, 0.8, 1.0, 0.25];
+pub(super) const SMOOTH: [f32; 4] = [1.0, 0.7, 0.2, 1.0];
 
 /// A frame whose every surface could mirror, with a specular map of our own.
-fn frame(name: &str, width: u32, height: u32, mask: &Mask) -> Frame {
+pub(super) fn frame(name: &str, width: u32, height: u32, mask: &Mask) -> Frame {
     let size = FrameSize::new(width, height).unwrap();
     let mut frame = scene(name).unwrap().frame(size).unwrap();
     frame.specular = image(Format::Rgba8Unorm, width, height, mask);
     frame
 }
 
-fn single(at: (u32, u32), texel: [f32; 4]) -> Mask {
+pub(super) fn single(at: (u32, u32), texel: [f32; 4]) -> Mask {
     Box::new(move |x, y| if (x, y) == at { texel } else { [0.0; 4] })
 }
 
 /// One texel in so many, half of them smooth.
-fn sparse(seed: u32, one_in: u32) -> Mask {
+pub(super) fn sparse(seed: u32, one_in: u32) -> Mask {
     Box::new(move |x, y| {
         let random = hash(seed ^ hash(x ^ hash(y)));
         match random % one_in {
@@ -66,19 +66,19 @@ fn poison() -> KernelLibrary {
     kernels
 }
 
-struct Bench {
-    kernels: KernelLibrary,
-    poison: KernelLibrary,
-    backend: CpuBackend,
-    arithmetic: Arithmetic,
+pub(super) struct Bench {
+    pub(super) kernels: KernelLibrary,
+    pub(super) poison: KernelLibrary,
+    pub(super) backend: CpuBackend,
+    pub(super) arithmetic: Arithmetic,
 }
 
 impl Bench {
-    fn new(arithmetic: Arithmetic) -> Self {
+    pub(super) fn new(arithmetic: Arithmetic) -> Self {
         Self::with(arithmetic, CpuOptions::default())
     }
 
-    fn with(arithmetic: Arithmetic, options: CpuOptions) -> Self {
+    pub(super) fn with(arithmetic: Arithmetic, options: CpuOptions) -> Self {
         Self {
             kernels: etalon_effects::kernels(),
             poison: poison(),
@@ -87,7 +87,7 @@ impl Bench {
         }
     }
 
-    fn picture(&mut self, frame: &Frame, settings: &Ssr) -> ImageData {
+    pub(super) fn picture(&mut self, frame: &Frame, settings: &Ssr) -> ImageData {
         let mut run = Run::new();
         std::mem::swap(&mut run.kernels, &mut self.kernels);
         run.arithmetic = self.arithmetic;
@@ -100,7 +100,12 @@ impl Bench {
     }
 
     /// Where the picture on tiles is another than the whole one.
-    fn difference(&mut self, frame: &Frame, settings: &Ssr, tiles: Tiling) -> Option<usize> {
+    pub(super) fn difference(
+        &mut self,
+        frame: &Frame,
+        settings: &Ssr,
+        tiles: Tiling,
+    ) -> Option<usize> {
         let off = Ssr {
             tiles: Tiling::Off,
             ..*settings
@@ -116,7 +121,7 @@ impl Bench {
         texels.position(|(whole, tiled)| whole != tiled)
     }
 
-    fn hold(&mut self, frame: &Frame, settings: &Ssr, what: &str) {
+    pub(super) fn hold(&mut self, frame: &Frame, settings: &Ssr, what: &str) {
         for tiles in &Tiling::ALL[1..] {
             let found = self.difference(frame, settings, *tiles);
             assert_eq!(found, None, "{what}, {tiles:?}, {:?}", self.arithmetic);
@@ -125,7 +130,7 @@ impl Bench {
 }
 
 /// Quick to march, and blurred beyond a tile.
-fn settings(blur_radius: u32) -> Ssr {
+pub(super) fn settings(blur_radius: u32) -> Ssr {
     Ssr {
         resolution: 0.25,
         camera_fade: 0.0,

@@ -1,0 +1,131 @@
+//! Screen-space reflection of which one pixel in four is marched.
+//!
+//! Everything up to the mix has half the size, the blur half its reach; the mix brings
+//! each texel what was found for its own surface (`shaders/lib/upsample.wesl`). One look
+//! at a texel's roughness says which rate it gets, so the picture does not depend on
+//! tiles.
+
+use etalon_core::graph::{Graph, Texture};
+
+use super::passes::{Rate, blur_on, march_on, resolve_on, result_over};
+use super::{Blend, Ssr, tiled};
+use crate::tiles::{Area, Axis, Marks, TileSize};
+use crate::{EffectError, SceneInputs};
+
+/// Texels of half the size that the mix reads.
+const READ: u32 = 1;
+/// The blur along columns reads what the blur along rows writes here.
+const BLURRED: u32 = 2;
+/// The blur along rows reads reflections here.
+const REFLECTED: u32 = 4;
+
+/// Where passes run.
+struct Areas {
+    /// At half the size: the march, and what looks up its colours.
+    found: Area,
+    /// Both passes of the blur.
+    blurred: [Area; 2],
+    /// Of the picture: the mix.
+    mixed: Area,
+    /// And what mirrors nothing.
+    others: Option<Area>,
+}
+
+/// Adds to `beneath` the reflections of surfaces of at least a roughness; without
+/// `beneath` those of all, to a picture of its own.
+pub(super) fn ssr(
+    graph: &mut Graph,
+    inputs: &SceneInputs,
+    settings: &Ssr,
+    beneath: Option<Texture>,
+) -> Result<Texture, EffectError> {
+    let radius = settings.blur_radius.div_ceil(2);
+    let areas = match settings.tiles.size() {
+        Some(tiles) => on_tiles(graph, inputs.specular, settings, radius, tiles)?,
+        None => Areas {
+            found: Area::Picture,
+            blurred: [Area::Picture; 2],
+            mixed: Area::Picture,
+            others: None,
+        },
+    };
+    let reflection = march_on(
+        graph,
+        inputs.depth,
+        inputs.normal,
+        &inputs.camera,
+        settings,
+        Rate::Quarter,
+        areas.found,
+    )?;
+    let sharp = resolve_on(graph, reflection, inputs.colour, Rate::Quarter, areas.found)?;
+    let blurred = if radius > 0 {
+        let blurred = blur_on(graph, sharp, radius, Rate::Quarter, areas.blurred)?;
+        Some(blurred)
+    } else {
+        None
+    };
+
+    let target = beneath.unwrap_or_else(|| result_over(graph, inputs.colour));
+    let mut pass = inputs
+        .camera
+        .set(graph.compute("ssr/mix_quarter"))
+        .read("source", inputs.colour)
+        .read("specular", inputs.specular)
+        .read("depth", inputs.depth)
+        .read("normal", inputs.normal)
+        .read("sharp", sharp)
+        .feature("blurred", blurred.is_some())
+        .constant("ADD", f64::from(u8::from(settings.blend == Blend::Add)));
+    if let Some(blurred) = blurred {
+        pass = pass.read("blurred", blurred);
+    }
+    if beneath.is_some() {
+        pass = pass
+            .feature("rougher", true)
+            .set("quarter_from", settings.quarter_from);
+    }
+    let result = match areas.mixed {
+        Area::Picture if beneath.is_some() => {
+            pass.write_part("result", target).per_texel("result")?
+        }
+        area => area.run(pass, target)?,
+    };
+    match areas.others.filter(|_| beneath.is_none()) {
+        Some(others) => tiled::keep(graph, inputs.colour, result, others),
+        None => Ok(result),
+    }
+}
+
+/// The tiles that show something mirrored at this rate.
+fn on_tiles(
+    graph: &mut Graph,
+    specular: Texture,
+    settings: &Ssr,
+    radius: u32,
+    tiles: TileSize,
+) -> Result<Areas, EffectError> {
+    let marks = Marks::half_texture(graph, "ssr.marks quarter", specular);
+    let marks = graph
+        .compute("ssr/classify")
+        .named("ssr/classify quarter")
+        .read("specular", specular)
+        .write("result", marks)
+        .feature("quarter", true)
+        .set("quarter_from", settings.quarter_from)
+        .per_texel("result")?;
+    let read = Marks::of(graph, marks, tiles)?;
+    let mut marks = read;
+    if radius > 0 {
+        marks = marks
+            .spread(graph, Axis::Y, radius, READ, BLURRED)?
+            .spread(graph, Axis::X, radius, BLURRED, REFLECTED)?;
+    }
+    let around = marks.with(graph, BLURRED)?;
+    Ok(Areas {
+        found: Area::Tiles(marks.with(graph, READ | REFLECTED)?),
+        blurred: [Area::Tiles(around), Area::Tiles(read.with(graph, READ)?)],
+        mixed: Area::Tiles(read.doubled().with(graph, READ)?),
+        others: Some(Area::Tiles(read.doubled().without(graph, READ)?)),
+    })
+}

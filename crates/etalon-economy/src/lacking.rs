@@ -51,9 +51,21 @@ fn cases(frame: &Frame, options: &Options) -> Result<Vec<Case>, EconomyError> {
     };
     let mirrors = mask(Layout::Compact, MIRRORS, frame.size());
     let rough = specular(frame, &mirrors)?;
-    let smooth = changed(&rough, |[r, g, b, _]| [r, g, b, 1.0])?;
+    let smooth = changed(&rough, |_, [r, g, b, _]| [r, g, b, 1.0])?;
+    let width = rough.desc.extent.width as usize;
+    let half = changed(&rough, |index, [r, g, b, _]| {
+        let left = index % width < width / 2;
+        [r, g, b, if left { 1.0 } else { 0.2 }]
+    })?;
+    let quarter = |quarter_from| ChainSettings {
+        ssr: full.ssr.map(|ssr| Ssr {
+            quarter_from,
+            ..ssr
+        }),
+        ..full
+    };
     let none = ImageData::zeroed(frame.specular.desc)?;
-    let dark = changed(&frame.colour, |[r, g, b, a]| {
+    let dark = changed(&frame.colour, |_, [r, g, b, a]| {
         [r.min(0.01), g.min(0.01), b.min(0.01), a]
     })?;
     let sky = vec![
@@ -90,6 +102,24 @@ fn cases(frame: &Frame, options: &Options) -> Result<Vec<Case>, EconomyError> {
         ),
         case("surfaces", "Nothing but sky.", sky, full),
         case(
+            "three rays in four",
+            "As the first, of which one texel in four is marched.",
+            mirroring(),
+            quarter(0.0),
+        ),
+        case(
+            "half of what is rough",
+            "As the first, but what mirrors on the left is smooth.",
+            vec![("specular", half.clone())],
+            full,
+        ),
+        case(
+            "three rays in four of what is rough there",
+            "The same, of which one texel in four is marched where it is rough.",
+            vec![("specular", half)],
+            quarter(0.5),
+        ),
+        case(
             "bright light",
             "Nothing blooms; bloom works all the same.",
             vec![("specular", rough.clone()), ("colour", dark)],
@@ -124,9 +154,10 @@ fn cases(frame: &Frame, options: &Options) -> Result<Vec<Case>, EconomyError> {
 
 fn changed(
     image: &ImageData,
-    change: impl Fn([f32; 4]) -> [f32; 4],
+    change: impl Fn(usize, [f32; 4]) -> [f32; 4],
 ) -> Result<ImageData, EconomyError> {
-    let texels: Vec<[f32; 4]> = image.to_rgba_f32()?.into_iter().map(change).collect();
+    let texels = image.to_rgba_f32()?.into_iter().enumerate();
+    let texels: Vec<[f32; 4]> = texels.map(|(index, texel)| change(index, texel)).collect();
     Ok(ImageData::from_rgba_f32(image.desc, &texels)?)
 }
 

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::metric::hits::{Distances, Hits, hits as compare};
 use crate::model::{ErrorKind, Fact, Metric};
-use crate::observe::Observed;
+use crate::observe::{ObserveError, Observed};
 use crate::pictures::Picture;
 use crate::stage::Stage;
 
@@ -157,8 +157,8 @@ impl Judge for Reflections {
 
     fn judge(&self, seen: &Observed, exact: &Observed) -> Result<Judgement, JudgeError> {
         let mut judgement = Judgement::default();
-        let places = places(seen.texture("ssr/march", "result")?);
-        let exact_places = self::places(exact.texture("ssr/march", "result")?);
+        let places = places(seen, self.size)?;
+        let exact_places = self::places(exact, self.size)?;
         let reflecting = places.iter().zip(&self.reflects);
         let reflecting: Places = reflecting
             .map(|(place, reflects)| place.filter(|_| *reflects))
@@ -184,12 +184,28 @@ impl Judge for Reflections {
     }
 }
 
-/// Where a march found something: its length is not 0.
-fn places(march: &Plane) -> Places {
-    let texels = march.texels().iter();
-    texels
-        .map(|&[u, v, _, length]| (length > 0.0).then_some([u, v]))
-        .collect()
+/// Where reflections were found: their length is not 0. Pixels that were not marched
+/// themselves have the place of the one that was among their four.
+fn places(seen: &Observed, [width, height]: [u32; 2]) -> Result<Places, ObserveError> {
+    let full = seen.texture("ssr/march", "result");
+    let quarter = seen.texture("ssr/march quarter", "result");
+    let marches: Vec<(&Plane, u32)> = match (full, quarter) {
+        (Ok(full), Ok(quarter)) => vec![(full, 1), (quarter, 2)],
+        (Err(_), Ok(quarter)) => vec![(quarter, 2)],
+        (full, Err(_)) => vec![(full?, 1)],
+    };
+    let place = |x: u32, y: u32| {
+        marches.iter().find_map(|(march, side)| {
+            let row = march.size()[0] * (y / side);
+            let [u, v, _, length] = *march.texels().get((row + x / side) as usize)?;
+            (length > 0.0).then_some([u, v])
+        })
+    };
+    let rows = 0..height;
+    Ok(rows
+        .flat_map(|y| (0..width).map(move |x| (x, y)))
+        .map(|(x, y)| place(x, y))
+        .collect())
 }
 
 fn insert(judgement: &mut Judgement, kind: ErrorKind, hits: &Hits) {

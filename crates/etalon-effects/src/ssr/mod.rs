@@ -159,7 +159,7 @@ knobs!(Ssr, "ssr" {
     real border [0.0, 0.5] "", Look [0.0, 0.1, 0.25], "width of the band along the edges in which reflections fade out";
     count blur_radius [0, 64] "texels", Look [0, 2, 6, 16], "reach of the blur on rough surfaces";
     choice storage [HitStorage] "", Accuracy ["rgba16float", "rgba32float"], "what places of reflections are stored in";
-    real quarter_from [0.0, 2.0] "", Accuracy [0.0, 0.25, 0.5, 0.75, 2.0], "roughness from which one texel in four is marched";
+    real quarter_from [0.0, 2.0] "", Accuracy [0.0, 2.0], "roughness from which one texel in four is marched";
     choice blend [Blend] "", Look ["add", "replace"], "how the reflection is put onto the scene";
     choice tiles [Tiling] "texels", Cost ["off", "8", "16", "32", "64"], "side of the tiles of which those that show nothing mirrored are left out";
 });

@@ -116,6 +116,62 @@ fn reflections_run_only_where_something_mirrors_that_is_smooth_enough() {
     );
 }
 
+/// One rate where nothing calls for two, and a quarter of it where reflections are faint.
+#[test]
+fn rays_are_as_many_as_surfaces_call_for() {
+    let kernels = etalon_effects::kernels();
+    let told = |asked: f32, roughness: [f32; 2], faint_specular: f32| {
+        let mut request = Request::default();
+        request.demands.reflective = Some(Reflective {
+            roughness,
+            ..REFLECTIVE
+        });
+        request.thresholds.faint_specular = faint_specular;
+        request.settings.ssr = Some(Ssr {
+            quarter_from: asked,
+            ..Ssr::default()
+        });
+        let mut graph = Graph::new();
+        let images = inputs(&mut graph, 64, 48);
+        of_images(&mut graph, &images, &request).expect("valid");
+        let plan = plan(&graph, &kernels);
+        let effects = plan.effects.iter();
+        let reason = effects
+            .filter(|effect| effect.name == "ssr/quarter")
+            .map(|effect| effect.decision.reason().to_owned())
+            .next();
+        let rate = request.called_for().ssr.map(|ssr| ssr.quarter_from);
+        (rate.expect("on"), reason.unwrap_or_default())
+    };
+    let none = Ssr::NO_QUARTER;
+    assert_eq!(told(0.5, [0.25, 0.75], 0.0), (0.5, String::new()));
+    assert_eq!(told(none, [0.25, 0.75], 0.0), (none, String::new()));
+    assert_eq!(told(0.0, [0.25, 0.75], 0.0), (0.0, String::new()));
+    let (rate, reason) = told(0.5, [0.75, 1.0], 0.0);
+    assert_eq!(rate, 0.0);
+    assert_eq!(
+        reason,
+        "nothing that mirrors is smoother than 0.75: one texel in four is marched"
+    );
+    let (rate, reason) = told(0.5, [0.0, 0.25], 0.0);
+    assert_eq!(rate, none);
+    assert_eq!(
+        reason,
+        "nothing that mirrors is rougher than 0.25: every texel is marched"
+    );
+    // Half of a step of an 8-bit map from the limit nothing is said.
+    assert_eq!(told(0.5, [0.501, 1.0], 0.0).0, 0.5);
+    assert_eq!(told(0.5, [0.0, 0.499], 0.0).0, 0.5);
+    // Half of a colour is mirrored.
+    assert_eq!(told(none, [0.25, 0.75], 0.49).0, none);
+    let (rate, reason) = told(none, [0.25, 0.75], 0.5);
+    assert_eq!(rate, 0.0);
+    assert_eq!(
+        reason,
+        "no surface mirrors more than 0.5 of a colour: one texel in four is marched"
+    );
+}
+
 #[test]
 fn tiles_are_off_where_so_much_mirrors_that_they_are_not_worth_it() {
     let tiles = |lower: [f32; 2], cost: Option<Cost>| {
@@ -362,6 +418,10 @@ fn demands_that_are_no_numbers_are_refused() {
     assert_eq!(
         refused(&|request| request.thresholds.max_roughness = f32::NAN),
         "max_roughness"
+    );
+    assert_eq!(
+        refused(&|request| request.thresholds.faint_specular = 1.5),
+        "faint_specular"
     );
     assert_eq!(
         refused(&|request| request.thresholds.min_specular = -1.0),

@@ -167,6 +167,35 @@ fn what_is_marched_is_what_it_would_be() {
     }
 }
 
+/// Where all surfaces are on one side of the limit, the rate of that side alone gives the
+/// same picture: what planning makes of it changes no bit.
+#[test]
+fn one_rate_does_where_no_surface_asks_for_two() {
+    let mut bench = Bench::new(Arithmetic::Strict);
+    for (shine, one_rate) in [(0.2, 0.0), (0.8, Ssr::NO_QUARTER)] {
+        let mask: Mask = Box::new(move |x, y| {
+            let mirrors = hash(x ^ hash(y)) % 3 > 0;
+            if mirrors {
+                [1.0, 0.5, 0.25, shine]
+            } else {
+                [0.0; 4]
+            }
+        });
+        let frame = frame("corridor-grazing", 97, 55, &mask);
+        for tiles in [Tiling::Off, Tiling::Texels8] {
+            let mut at = |quarter_from| {
+                let settings = Ssr {
+                    quarter_from,
+                    tiles,
+                    ..settings(6)
+                };
+                bench.picture(&frame, &settings)
+            };
+            assert!(at(0.5) == at(one_rate), "{shine}, {tiles:?}");
+        }
+    }
+}
+
 /// Of a roughness over 1 there is nothing: the passes are the ones without.
 #[test]
 fn no_quarter_has_no_passes() {

@@ -22,6 +22,7 @@ use crate::forward::{Lamps, Lighting, forward, glass};
 use crate::geometry::{Geometry, Item, View, gbuffer, prepass};
 use crate::lighting::{PunctualLight, lighting};
 use crate::registry::effect;
+use crate::tiles::Tiling;
 use crate::{
     Chain, ChainSettings, EffectError, SceneInputs, chain, forward as forward_module, geometry,
     lighting as lighting_module, ssr,
@@ -102,6 +103,9 @@ impl Request {
         if suited.tiles != asked.tiles {
             let reason = "so much of the screen mirrors that tiles would cost more than they save";
             graph.decide("ssr/classify", Decision::absent(reason));
+        }
+        if suited.tiles != Tiling::Off {
+            graph.decide("tiles", Decision::runs("`ssr` runs on lists of them"));
         }
     }
 
@@ -405,6 +409,26 @@ impl Parts {
         let gbuffer = decide("geometry/gbuffer", surfaces(gbuffer));
         let thin = decide("forward/thin", surfaces(thin));
         let glass = decide("forward/glass", forward_module::demand::glass(&calls));
+        let mut whole = |effect: &str, runs: bool, why: &str, why_not: &str| {
+            let decision = if runs {
+                Decision::runs(why)
+            } else {
+                Decision::absent(why_not)
+            };
+            decide(effect, decision);
+        };
+        let (some, none) = (
+            "some of its passes are called for",
+            "none of its passes is called for",
+        );
+        whole("geometry", prepass || velocity || gbuffer, some, none);
+        whole("forward", forward || glass || thin, some, none);
+        whole(
+            "environment",
+            lighting || forward || glass,
+            "it lights surfaces",
+            "no surface is lit",
+        );
         Self {
             prepass,
             velocity,

@@ -21,8 +21,8 @@ pub struct Cost {
 /// tiles, on the interpreter: of what was measured, where tiles pay least (see
 /// `docs/measurements/economy.md`).
 pub const MEASURED: Cost = Cost {
-    idle: 0.043,
-    slope: 1.021,
+    idle: 0.012,
+    slope: 1.052,
     whole: 1.0,
 };
 

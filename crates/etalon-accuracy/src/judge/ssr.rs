@@ -185,26 +185,38 @@ impl Judge for Reflections {
 }
 
 /// Where reflections were found: their length is not 0. Pixels that were not marched
-/// themselves have the place of the one that was among their four.
+/// themselves have the mean of the places of those around them that found one.
 fn places(seen: &Observed, [width, height]: [u32; 2]) -> Result<Places, ObserveError> {
     let full = seen.texture("ssr/march", "result");
     let quarter = seen.texture("ssr/march quarter", "result");
-    let marches: Vec<(&Plane, u32)> = match (full, quarter) {
-        (Ok(full), Ok(quarter)) => vec![(full, 1), (quarter, 2)],
-        (Err(_), Ok(quarter)) => vec![(quarter, 2)],
-        (full, Err(_)) => vec![(full?, 1)],
+    let (full, quarter) = match (full, quarter) {
+        (full, Err(_)) => (Some(full?), None),
+        (full, Ok(quarter)) => (full.ok(), Some(quarter)),
     };
-    let place = |x: u32, y: u32| {
-        marches.iter().find_map(|(march, side)| {
-            let row = march.size()[0] * (y / side);
-            let [u, v, _, length] = *march.texels().get((row + x / side) as usize)?;
-            (length > 0.0).then_some([u, v])
-        })
+    let found = |march: &Plane, [x, y]: [u32; 2]| {
+        let [u, v, _, length] = *march.texels().get((march.size()[0] * y + x) as usize)?;
+        (length > 0.0).then_some([u, v])
     };
-    let rows = 0..height;
-    Ok(rows
-        .flat_map(|y| (0..width).map(move |x| (x, y)))
-        .map(|(x, y)| place(x, y))
+    let between = |march: &Plane, at: [u32; 2]| {
+        let [columns, rows] = [0, 1].map(|axis| {
+            let near = at[axis] / 2;
+            [near, (near + at[axis] % 2).min(march.size()[axis] - 1)]
+        });
+        let ends = rows.iter().flat_map(|&y| columns.map(|x| [x, y]));
+        let around: Vec<[f64; 2]> = ends.filter_map(|at| found(march, at)).collect();
+        let mean = |axis: usize| {
+            let sum: f64 = around.iter().map(|place| place[axis]).sum();
+            sum / around.len() as f64
+        };
+        (!around.is_empty()).then(|| [mean(0), mean(1)])
+    };
+    let place = |at: [u32; 2]| {
+        let full = full.and_then(|march| found(march, at));
+        full.or_else(|| between(quarter?, at))
+    };
+    Ok((0..height)
+        .flat_map(|y| (0..width).map(move |x| [x, y]))
+        .map(place)
         .collect())
 }
 

@@ -15,7 +15,7 @@ use crate::common::{Run, hash, image, texels};
 fn every_roughness(seed: u32) -> Mask {
     Box::new(move |x, y| {
         let random = hash(seed ^ hash(x ^ hash(y)));
-        if random % 5 == 0 {
+        if random.is_multiple_of(5) {
             return [0.0; 4];
         }
         [1.0, 0.7, 0.4, (random >> 8 & 255) as f32 / 255.0]
@@ -174,7 +174,7 @@ fn one_rate_does_where_no_surface_asks_for_two() {
     let mut bench = Bench::new(Arithmetic::Strict);
     for (shine, one_rate) in [(0.2, 0.0), (0.8, Ssr::NO_QUARTER)] {
         let mask: Mask = Box::new(move |x, y| {
-            let mirrors = hash(x ^ hash(y)) % 3 > 0;
+            let mirrors = !hash(x ^ hash(y)).is_multiple_of(3);
             if mirrors {
                 [1.0, 0.5, 0.25, shine]
             } else {

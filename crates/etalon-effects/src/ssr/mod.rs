@@ -135,7 +135,9 @@ pub struct Ssr {
     /// surfaces, over 1 none. The others are given what was found for their own surface
     /// next to them. Rough surfaces, whose reflections are blurred, hide that; on smooth
     /// ones thin things and outlines in reflections show it. A quarter of the cost of the
-    /// search and of the blur, where all of a tile is that rough.
+    /// search, and less of the blur's, where all of a tile is that rough; a tile that is so
+    /// in part is searched at both rates, and without `tiles` the whole picture is unless
+    /// this is 0.
     pub quarter_from: f32,
     /// How the reflection is put onto the scene.
     pub blend: Blend,

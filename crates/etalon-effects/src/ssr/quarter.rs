@@ -23,11 +23,11 @@ const REFLECTED: u32 = 4;
 struct Areas {
     /// At half the size: the march, and what looks up its colours.
     found: Area,
-    /// Both passes of the blur.
-    blurred: [Area; 2],
+    /// Both passes of the blur, if there is one.
+    blurred: Option<[Area; 2]>,
     /// Of the picture: the mix.
     mixed: Area,
-    /// And what mirrors nothing.
+    /// And what mirrors nothing, if nobody else writes that.
     others: Option<Area>,
 }
 
@@ -41,10 +41,13 @@ pub(super) fn ssr(
 ) -> Result<Texture, EffectError> {
     let radius = settings.blur_radius.div_ceil(2);
     let areas = match settings.tiles.size() {
-        Some(tiles) => on_tiles(graph, inputs.specular, settings, radius, tiles)?,
+        Some(tiles) => {
+            let marks = classify(graph, inputs.specular, settings.quarter_from, tiles)?;
+            on_tiles(graph, marks, radius, beneath.is_none())?
+        }
         None => Areas {
             found: Area::Picture,
-            blurred: [Area::Picture; 2],
+            blurred: (radius > 0).then_some([Area::Picture; 2]),
             mixed: Area::Picture,
             others: None,
         },
@@ -59,11 +62,9 @@ pub(super) fn ssr(
         areas.found,
     )?;
     let sharp = resolve_on(graph, reflection, inputs.colour, Rate::Quarter, areas.found)?;
-    let blurred = if radius > 0 {
-        let blurred = blur_on(graph, sharp, radius, Rate::Quarter, areas.blurred)?;
-        Some(blurred)
-    } else {
-        None
+    let blurred = match areas.blurred {
+        Some(areas) => Some(blur_on(graph, sharp, radius, Rate::Quarter, areas)?),
+        None => None,
     };
 
     let target = beneath.unwrap_or_else(|| result_over(graph, inputs.colour));
@@ -91,20 +92,19 @@ pub(super) fn ssr(
         }
         area => area.run(pass, target)?,
     };
-    match areas.others.filter(|_| beneath.is_none()) {
+    match areas.others {
         Some(others) => tiled::keep(graph, inputs.colour, result, others),
         None => Ok(result),
     }
 }
 
-/// The tiles that show something mirrored at this rate.
-fn on_tiles(
+/// Which tiles at half the size the mix reads.
+fn classify(
     graph: &mut Graph,
     specular: Texture,
-    settings: &Ssr,
-    radius: u32,
+    quarter_from: f32,
     tiles: TileSize,
-) -> Result<Areas, EffectError> {
+) -> Result<Marks, EffectError> {
     let marks = Marks::half_texture(graph, "ssr.marks quarter", specular);
     let marks = graph
         .compute("ssr/classify")
@@ -112,20 +112,32 @@ fn on_tiles(
         .read("specular", specular)
         .write("result", marks)
         .feature("quarter", true)
-        .set("quarter_from", settings.quarter_from)
+        .set("quarter_from", quarter_from)
         .per_texel("result")?;
-    let read = Marks::of(graph, marks, tiles)?;
-    let mut marks = read;
+    Marks::of(graph, marks, tiles)
+}
+
+/// The tiles that show something mirrored at this rate, and the others if `all` of the
+/// picture is to be written.
+fn on_tiles(graph: &mut Graph, marks: Marks, radius: u32, all: bool) -> Result<Areas, EffectError> {
+    let read = marks.with(graph, READ)?;
+    let (mut found, mut blurred) = (read, None);
     if radius > 0 {
-        marks = marks
+        let marks = marks
             .spread(graph, Axis::Y, radius, READ, BLURRED)?
             .spread(graph, Axis::X, radius, BLURRED, REFLECTED)?;
+        found = marks.with(graph, READ | REFLECTED)?;
+        blurred = Some([marks.with(graph, BLURRED)?, read].map(Area::Tiles));
     }
-    let around = marks.with(graph, BLURRED)?;
+    let picture = marks.doubled();
     Ok(Areas {
-        found: Area::Tiles(marks.with(graph, READ | REFLECTED)?),
-        blurred: [Area::Tiles(around), Area::Tiles(read.with(graph, READ)?)],
-        mixed: Area::Tiles(read.doubled().with(graph, READ)?),
-        others: Some(Area::Tiles(read.doubled().without(graph, READ)?)),
+        found: Area::Tiles(found),
+        blurred,
+        mixed: Area::Tiles(picture.with(graph, READ)?),
+        others: if all {
+            Some(Area::Tiles(picture.without(graph, READ)?))
+        } else {
+            None
+        },
     })
 }

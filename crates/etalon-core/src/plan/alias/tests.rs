@@ -1,35 +1,26 @@
 //! Placements against brute force.
 
+use proptest::collection::vec;
+use proptest::sample::select;
+use proptest::strategy::{Strategy as _, ValueTree as _};
+use proptest::test_runner::TestRunner;
+
 use super::*;
 use crate::plan::Usage;
 
-/// Numbers from a seed (SplitMix64; G. Steele, D. Lea and C. Flood, "Fast Splittable
-/// Pseudorandom Number Generators", OOPSLA 2014).
-struct Numbers(u64);
-
-impl Numbers {
-    fn below(&mut self, limit: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) % limit
-    }
-
-    fn items(&mut self, count: usize, steps: u64) -> Vec<Item> {
-        let mut items: Vec<Item> = (0..count)
-            .map(|resource| {
-                let first = self.below(steps) as u32;
-                Item {
-                    resource,
-                    first,
-                    last: first + self.below(6) as u32,
-                    bytes: self.below(9),
-                }
-            })
-            .collect();
-        items.sort_by_key(|item| item.first);
-        items
-    }
+/// Lives at random, in the order of their first steps.
+fn items(random: &mut TestRunner, count: usize, steps: u32) -> Vec<Item> {
+    let lives = vec((0..steps, 0..6_u32, 0..9_u64), count);
+    let lives = lives.new_tree(random).unwrap().current();
+    let life = |(resource, (first, more, bytes))| Item {
+        resource,
+        first,
+        last: first + more,
+        bytes,
+    };
+    let mut items: Vec<Item> = lives.into_iter().enumerate().map(life).collect();
+    items.sort_by_key(|item| item.first);
+    items
 }
 
 /// Two items that share a byte and a step, or one outside of the heap.
@@ -61,9 +52,7 @@ fn alive(items: &[Item]) -> u64 {
     (0..=last).map(at).max().unwrap_or(0)
 }
 
-/// The smallest heap there is: of some optimal placement every item can be moved down
-/// until it rests on another or on the ground, so trying as many offsets as there are
-/// sums of items' sizes, item by item, misses none.
+/// The smallest heap there is: every offset of every item is tried.
 fn optimum(items: &[Item]) -> u64 {
     fn search(items: &[Item], offsets: &mut Vec<u64>, best: &mut u64, tops: u64) {
         if tops >= *best {
@@ -95,10 +84,10 @@ fn optimum(items: &[Item]) -> u64 {
 
 #[test]
 fn nothing_alive_at_once_shares_bytes() {
-    let mut numbers = Numbers(1);
+    let mut random = TestRunner::deterministic();
     for count in [0, 1, 2, 7, 40, 200] {
         for _ in 0..30 {
-            let items = numbers.items(count, 60);
+            let items = items(&mut random, count, 60);
             let least = least(&items);
             assert_eq!(least, alive(&items));
             for layout in [
@@ -117,8 +106,8 @@ fn nothing_alive_at_once_shares_bytes() {
 
 #[test]
 fn a_shared_byte_would_be_seen() {
-    let mut numbers = Numbers(2);
-    let items = numbers.items(40, 20);
+    let mut random = TestRunner::deterministic();
+    let items = items(&mut random, 40, 20);
     let layout = smallest(&items);
     assert_eq!(fault(&items, &layout), None);
     let large = (0..items.len()).find(|&k| layout.offsets[k] > 0 && items[k].bytes > 0);
@@ -134,10 +123,10 @@ fn a_shared_byte_would_be_seen() {
 /// but has to come close: of random lives, at most one in twenty may be larger.
 #[test]
 fn heaps_are_mostly_as_small_as_can_be() {
-    let mut numbers = Numbers(3);
+    let mut random = TestRunner::deterministic();
     let (mut larger, cases) = (0, 200);
     for _ in 0..cases {
-        let items = numbers.items(7, 8);
+        let items = items(&mut random, 7, 8);
         let optimum = optimum(&items);
         let found = smallest(&items).size;
         assert!(found >= optimum);
@@ -164,7 +153,7 @@ fn lives_are_packed_where_a_sweep_leaves_holes() {
 
 #[test]
 fn earlier_tenants_are_those_of_every_byte() {
-    let mut numbers = Numbers(4);
+    let mut random = TestRunner::deterministic();
     let all = [
         Usage::Sampled,
         Usage::StorageRead,
@@ -172,12 +161,11 @@ fn earlier_tenants_are_those_of_every_byte() {
         Usage::CopySource,
     ];
     for _ in 0..50 {
-        let items = numbers.items(30, 40);
+        let items = items(&mut random, 30, 40);
         let layout = smallest(&items);
-        let usages: Vec<UsageSet> = items
-            .iter()
-            .map(|_| UsageSet::EMPTY.with(all[numbers.below(4) as usize]))
-            .collect();
+        let usages = vec(select(all.to_vec()), items.len());
+        let usages = usages.new_tree(&mut random).unwrap().current();
+        let usages: Vec<UsageSet> = usages.into_iter().map(UsageSet::from).collect();
         let found = tenants::before(&items, &layout.offsets, &usages);
         for (k, item) in items.iter().enumerate() {
             let mut fresh = 0;

@@ -128,6 +128,9 @@ impl EffectEntry {
     }
 }
 
+/// Declares an effect on the image of an environment map with some knobs set.
+type DeclareOnMap = fn(&mut Graph, Texture, &[(&str, KnobValue)]) -> Result<Texture, EffectError>;
+
 /// An effect that is made of an environment map, once for many frames.
 #[derive(Clone, Copy, Debug)]
 pub struct MapEntry {
@@ -136,7 +139,7 @@ pub struct MapEntry {
     /// What it does, in a sentence.
     pub description: &'static str,
     knobs: fn() -> Vec<KnobInfo>,
-    declare: fn(&mut Graph, Texture, &[(&str, KnobValue)]) -> Result<Texture, EffectError>,
+    declare: DeclareOnMap,
 }
 
 impl MapEntry {

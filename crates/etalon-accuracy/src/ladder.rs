@@ -8,9 +8,10 @@
 use std::fmt::Write as _;
 
 use etalon_core::kernel::Arithmetic;
-use etalon_effects::EffectEntry;
 use etalon_effects::knob::{KnobInfo, KnobValue, Role};
 use etalon_effects::quality::{self, Quality};
+
+use crate::trial::Swept;
 
 /// One setting to be tried.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,7 +45,7 @@ impl Setting {
 
 /// The knobs whose values are tried.
 #[must_use]
-pub fn knobs(effect: &EffectEntry) -> Vec<KnobInfo> {
+pub fn knobs(effect: &Swept) -> Vec<KnobInfo> {
     let mut knobs = effect.knobs();
     knobs.retain(|knob| knob.role == Role::Accuracy);
     knobs
@@ -53,7 +54,7 @@ pub fn knobs(effect: &EffectEntry) -> Vec<KnobInfo> {
 /// The settings to be tried with at most `depth` knobs turned, the least turned
 /// first; presets, however far they are turned, right after the default.
 #[must_use]
-pub fn settings(effect: &EffectEntry, depth: usize) -> Vec<Setting> {
+pub fn settings(effect: &Swept, depth: usize) -> Vec<Setting> {
     let knobs = knobs(effect);
     let mut settings = vec![Setting {
         arithmetic: Arithmetic::Strict,
@@ -102,13 +103,8 @@ pub fn settings(effect: &EffectEntry, depth: usize) -> Vec<Setting> {
     settings
 }
 
-fn preset(
-    knobs: &[KnobInfo],
-    effect: &EffectEntry,
-    quality: Quality,
-    arithmetic: Arithmetic,
-) -> Setting {
-    let preset = quality::preset(effect.name, quality);
+fn preset(knobs: &[KnobInfo], effect: &Swept, quality: Quality, arithmetic: Arithmetic) -> Setting {
+    let preset = quality::preset(effect.name(), quality);
     let value = |knob: &KnobInfo| {
         let set = preset.iter().find(|(name, _)| *name == knob.name);
         (knob.name, set.map_or(knob.default, |(_, value)| *value))
@@ -126,16 +122,22 @@ fn preset(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use etalon_effects::{effect, effects};
+    use etalon_effects::effects;
     use std::collections::BTreeSet;
+
+    /// What has no knobs as well.
+    fn all() -> impl Iterator<Item = Swept> {
+        let maps = etalon_effects::map_effects().iter().map(Swept::Map);
+        effects().iter().map(Swept::Frame).chain(maps)
+    }
 
     #[test]
     fn every_two_knobs_are_turned_together_and_nothing_twice() {
-        for effect in effects() {
-            let knobs = knobs(effect);
-            let settings = settings(effect, 2);
+        for effect in all() {
+            let knobs = knobs(&effect);
+            let settings = settings(&effect, 2);
             let ids: BTreeSet<String> = settings.iter().map(|setting| setting.id(&knobs)).collect();
-            assert_eq!(ids.len(), settings.len(), "{}", effect.name);
+            assert_eq!(ids.len(), settings.len(), "{}", effect.name());
             assert!(ids.iter().all(|id| {
                 let good = |letter: char| letter.is_ascii_alphanumeric() || "-.".contains(letter);
                 id.chars().all(good)
@@ -153,22 +155,22 @@ mod tests {
             let squares: usize = steps.iter().map(|count| count * count).sum();
             let expected = 1 + singles + (singles * singles - squares) / 2;
             let further = settings.iter().filter(|setting| setting.turned > 2).count();
-            assert_eq!(settings.len(), expected + further, "{}", effect.name);
+            assert_eq!(settings.len(), expected + further, "{}", effect.name());
             assert!(further <= 2 * Quality::ALL.len());
         }
     }
 
     #[test]
     fn the_default_is_first_and_every_preset_is_there() {
-        for entry in effects() {
+        for entry in all() {
             for depth in 0..3 {
-                let settings = settings(entry, depth);
-                assert_eq!(settings[0].turned, 0, "{}", entry.name);
+                let settings = settings(&entry, depth);
+                assert_eq!(settings[0].turned, 0, "{}", entry.name());
                 let presets = settings.iter().filter(|setting| setting.preset.is_some());
-                assert!(presets.count() >= 2, "{}", entry.name);
+                assert!(presets.count() >= 2, "{}", entry.name());
             }
         }
-        let ssr = effect("ssr").expect("registered");
-        assert_eq!(settings(ssr, 0)[0].id(&knobs(ssr)), "strict");
+        let ssr = Swept::named("ssr").expect("registered");
+        assert_eq!(settings(&ssr, 0)[0].id(&knobs(&ssr)), "strict");
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! * [`sweep`](mod@sweep): trying settings, errors first, then times in turns;
 //! * [`ladder`]: which settings are tried;
-//! * [`stage`]: a scene as effects and truths take it;
+//! * [`trial`]: effects, and what each is tried on;
+//! * [`stage`], [`sky`]: a scene, and a sky, as effects and truths take it;
 //! * [`executors`], [`observe`], [`work`]: running a setting, seeing what it wrote,
 //!   counting what it did;
 //! * [`judge`](mod@judge): which truths an effect is held to, and by what measure;
@@ -32,9 +33,11 @@ pub mod observe;
 pub mod pictures;
 pub mod profile;
 pub mod report;
+pub mod sky;
 pub mod stage;
 pub mod store;
 pub mod sweep;
 pub mod table;
 pub mod text;
+pub mod trial;
 pub mod work;

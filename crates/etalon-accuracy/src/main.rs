@@ -12,8 +12,8 @@ use etalon_accuracy::executors::Kind;
 use etalon_accuracy::model::{Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::sweep::{LEAST_FRAMES, Options, Progress, Scenes, sweep};
+use etalon_accuracy::trial::Swept;
 use etalon_accuracy::{profile, report, store, table, text};
-use etalon_effects::{EffectEntry, effect, effects};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Sweeps the settings of effects: their errors against independent truths beside
@@ -23,14 +23,15 @@ struct Arguments {
     /// Effects; all that have a truth without it.
     #[arg(long, value_delimiter = ',')]
     effect: Vec<String>,
-    /// Scenes; for each effect the one it has most to do on without it, and all that
-    /// it is judged on with `all`.
+    /// Scenes, and skies for the environment; for each effect the one it has most to do
+    /// on without it, and all that it is judged on with `all`.
     #[arg(long, value_delimiter = ',')]
     scene: Vec<String>,
     /// Backends.
     #[arg(long, value_delimiter = ',', default_value = "cpu,wgpu,ash")]
     backend: Vec<Kind>,
-    /// Pixels of the pictures.
+    /// Pixels of the pictures; an environment map is as many texels high as the largest
+    /// power of two that the height has room for, up to 256.
     #[arg(long, default_value = "640x360")]
     size: String,
     /// Minutes for everything; what does not fit is left out and said so.
@@ -60,22 +61,11 @@ struct Arguments {
 }
 
 impl Arguments {
-    fn effects(&self) -> Result<Vec<&'static EffectEntry>, String> {
-        let judged = || effects().iter().filter(|effect| effect.name != "chain");
+    fn effects(&self) -> Result<Vec<Swept>, String> {
         if self.effect.is_empty() {
-            return Ok(judged().collect());
+            return Ok(Swept::all().collect());
         }
-        let known = |name: &String| {
-            effect(name)
-                .filter(|effect| effect.name != "chain")
-                .ok_or_else(|| {
-                    let names: Vec<_> = judged().map(|effect| effect.name).collect();
-                    format!(
-                        "there is no effect `{name}` to judge; there are {}",
-                        names.join(", ")
-                    )
-                })
-        };
+        let known = |name: &String| Swept::named(name).map_err(|error| error.to_string());
         self.effect.iter().map(known).collect()
     }
 

@@ -1,17 +1,20 @@
 //! What was found, as the library's users take it.
 
 use etalon_effects::budget::{DeviceProfile, EffectProfile, ProfilePoint};
+use etalon_effects::effect;
 use etalon_effects::quality::tolerance;
 
 use crate::model::{ErrorKind, Executor, Subject, Sweep};
 
-/// The settings of every effect on one executor in fast arithmetic, which is what
+/// The settings of every effect of a frame on one executor in fast arithmetic, which is what
 /// an engine runs, on the first scene of each effect. The error is the main one of
 /// the algorithm, in multiples of what is [tolerable](tolerance).
 #[must_use]
 pub fn profile(sweep: &Sweep, executor: &Executor) -> DeviceProfile {
     let mut effects: Vec<EffectProfile> = Vec::new();
-    for subject in &sweep.subjects {
+    // What is made once for many frames is no part of a frame's time.
+    let framed = |subject: &&Subject| effect(&subject.effect).is_some();
+    for subject in sweep.subjects.iter().filter(framed) {
         if !effects.iter().any(|known| known.effect == subject.effect) {
             effects.push(EffectProfile {
                 effect: subject.effect.clone(),

@@ -9,7 +9,7 @@ use etalon_effects::{CameraParams, EffectEntry, EffectError};
 use etalon_scenes::frame::FrameError;
 use etalon_scenes::scenes::WorldError;
 use etalon_scenes::trace::Reflection;
-use etalon_scenes::{Frame, FrameSize, World, scene, scenes};
+use etalon_scenes::{Frame, FrameSize, World, scene, scenes, skies};
 use thiserror::Error;
 
 /// Seconds between frames: results depend on no clock.
@@ -29,6 +29,15 @@ pub enum StageError {
         /// As given.
         name: String,
     },
+    /// No sky of that name.
+    #[error("there is no sky `{name}`; there are {}", skies().iter().map(|sky| sky.name).collect::<Vec<_>>().join(", "))]
+    NoSky {
+        /// As given.
+        name: String,
+    },
+    /// The sky is refused as an environment.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
     /// The scene cannot be rendered.
     #[error(transparent)]
     World(#[from] WorldError),

@@ -63,7 +63,7 @@ pub mod truth;
 pub use chain::{Chain, ChainSettings, chain};
 pub use error::{EffectError, SettingError};
 pub use quality::Quality;
-pub use registry::{EffectEntry, effect, effects};
+pub use registry::{EffectEntry, MapEntry, effect, effects, map_effects};
 pub use scene::{CameraParams, DepthRange, SceneInputs};
 
 /// A library of the kernels of all effects, to plan graphs with and to add one's own

@@ -7,6 +7,7 @@ use crate::bloom::{self, Bloom, bloom};
 use crate::chain::{ChainSettings, chain};
 use crate::composite::{self, Composite, composite};
 use crate::demand::{Calls, Need};
+use crate::environment::{Irradiance, Prefilter, environment};
 use crate::exposure::{self, Exposed, Exposure, exposure};
 use crate::knob::{KnobError, KnobInfo, KnobValue, Role, Tunable, infos, tuned};
 use crate::ssr::{self, Ssr, ssr};
@@ -25,7 +26,7 @@ enum How {
     Fixed(Declare),
 }
 
-/// An effect that can be built on any scene.
+/// An effect that can be built on the frame of any scene.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectEntry {
     /// By which it is known: its module and its folder of kernels.
@@ -127,7 +128,77 @@ impl EffectEntry {
     }
 }
 
-/// All effects, and `chain`, which is all of them one after the other.
+/// Declares an effect on the image of an environment map with some knobs set.
+type DeclareOnMap = fn(&mut Graph, Texture, &[(&str, KnobValue)]) -> Result<Texture, EffectError>;
+
+/// An effect that is made of an environment map, once for many frames.
+#[derive(Clone, Copy, Debug)]
+pub struct MapEntry {
+    /// By which it is known: its module and its folder of kernels.
+    pub name: &'static str,
+    /// What it does, in a sentence.
+    pub description: &'static str,
+    knobs: fn() -> Vec<KnobInfo>,
+    declare: DeclareOnMap,
+}
+
+impl MapEntry {
+    /// Its settings as data.
+    #[must_use]
+    pub fn knobs(&self) -> Vec<KnobInfo> {
+        (self.knobs)()
+    }
+
+    /// Declares it on the image of an [`EnvironmentMap`](crate::environment::EnvironmentMap)
+    /// with some knobs set, the others as they are by default.
+    ///
+    /// # Errors
+    /// If there is no such knob, a value is not allowed, or `base` is not of the size of
+    /// such an image.
+    pub fn build_with(
+        &self,
+        graph: &mut Graph,
+        base: Texture,
+        values: &[(&str, KnobValue)],
+    ) -> Result<Texture, EffectError> {
+        (self.declare)(graph, base, values)
+    }
+}
+
+/// Effects that are made of an environment map.
+#[must_use]
+pub const fn map_effects() -> &'static [MapEntry] {
+    MAP_EFFECTS
+}
+
+const MAP_EFFECTS: &[MapEntry] = &[MapEntry {
+    name: Prefilter::EFFECT,
+    description: "Light from everywhere, blurred by roughness as surfaces mirror it",
+    knobs: infos::<Prefilter>,
+    declare: |graph, base, values| {
+        // What surfaces scatter is no part of the map.
+        let scattered = Irradiance::default();
+        Ok(environment(graph, base, &scattered, &tuned(values)?)?.radiance)
+    },
+}];
+
+/// The effects that draw have no knob that trades accuracy for time. By name, why.
+pub const WITHOUT_KNOBS: &[(&str, &str)] = &[
+    (
+        "geometry",
+        "its formats are fixed, and each surface seen is drawn once, exactly where the rasteriser's rules say",
+    ),
+    (
+        "lighting",
+        "each light is evaluated at every pixel, in closed form; its reach is a look",
+    ),
+    (
+        "forward",
+        "each lamp is evaluated at every fragment, in closed form; its cost is theirs alone",
+    ),
+];
+
+/// All effects that run on a frame, and `chain`, which is all of them one after the other.
 #[must_use]
 pub const fn effects() -> &'static [EffectEntry] {
     EFFECTS

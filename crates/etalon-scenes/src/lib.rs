@@ -6,6 +6,7 @@
 //! * [`model`](mod@model): meshes, materials, lights and movements that backends draw.
 //! * [`models`](mod@models): a registry of procedural models.
 //! * [`scenes`](mod@scenes): a registry of procedural scenes.
+//! * [`skies`](mod@skies): a registry of procedural pictures of all directions.
 //! * [`cases`](mod@cases): inputs that are known to be hard, with their reasons.
 //! * [`demand`](mod@demand): what scenes call for, told before they are drawn.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
@@ -39,9 +40,11 @@ pub mod model;
 pub mod models;
 pub mod picture;
 pub mod scenes;
+pub mod skies;
 pub mod trace;
 
 pub use camera::{Camera, Pose, Projection};
 pub use frame::{Frame, FrameCamera, FrameSize};
 pub use models::{ModelEntry, model, models};
 pub use scenes::{SceneEntry, World, scene, scenes};
+pub use skies::{SkyEntry, skies, sky};

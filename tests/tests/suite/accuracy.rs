@@ -3,11 +3,11 @@
 
 use std::time::Duration;
 
-use etalon::effects::effect;
 use etalon_accuracy::executors::{Executor, Kind};
 use etalon_accuracy::model::Sweep;
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::sweep::{Options, Progress, Scenes, sweep};
+use etalon_accuracy::trial::Swept;
 use etalon_scenes::FrameSize;
 use etalon_tests::required;
 
@@ -33,10 +33,8 @@ fn strict_errors_are_the_same_on_every_backend() {
     };
     let backends: Vec<Kind> = Kind::ALL.into_iter().filter(there).collect();
     let options = Options {
-        effects: ["ssr", "exposure", "bloom", "composite"]
-            .map(|name| effect(name).unwrap())
-            .to_vec(),
-        scenes: Scenes::Named(vec!["wet-floor".to_owned()]),
+        effects: Swept::all().collect(),
+        scenes: Scenes::Named(["wet-floor", "sun"].map(str::to_owned).to_vec()),
         backends: backends.clone(),
         size: FrameSize::new(97, 55).unwrap(),
         depth: 1,
@@ -45,7 +43,7 @@ fn strict_errors_are_the_same_on_every_backend() {
     };
     let found = sweep(&options, None, &Pictures::none(), &mut Quiet).unwrap();
     assert_eq!(found.executors.len(), backends.len());
-    assert_eq!(found.subjects.len(), 4);
+    assert_eq!(found.subjects.len(), Swept::all().count());
     for subject in &found.subjects {
         for point in &subject.points {
             let what = format!("{} {}", subject.effect, point.id);

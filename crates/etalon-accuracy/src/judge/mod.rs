@@ -3,6 +3,7 @@
 //! The three [kinds of error](ErrorKind) are kept apart throughout. Truths are computed
 //! once for a scene; a judge then holds any number of settings to them.
 
+mod environment;
 mod light;
 mod ssr;
 
@@ -21,6 +22,7 @@ use crate::metric::flip::{hdr, ldr};
 use crate::model::{ErrorKind, Fact, Metric};
 use crate::observe::{ObserveError, Observed};
 use crate::pictures::{Picture, PictureError};
+use crate::sky::SkyStage;
 use crate::stage::{Stage, StageError};
 
 /// Why an effect cannot be judged.
@@ -28,7 +30,9 @@ use crate::stage::{Stage, StageError};
 #[non_exhaustive]
 pub enum JudgeError {
     /// There is no truth for it.
-    #[error("there is no truth for `{effect}`; there are ssr, exposure, bloom, composite")]
+    #[error(
+        "there is no truth for `{effect}` on a frame; there are ssr, exposure, bloom, composite"
+    )]
     NoTruth {
         /// The effect.
         effect: String,
@@ -84,7 +88,7 @@ pub trait Judge {
     fn judge(&self, seen: &Observed, exact: &Observed) -> Result<Judgement, JudgeError>;
 }
 
-/// The scenes that an effect is best judged on: where it has something to do, and
+/// The scenes or skies that an effect is best judged on: where it has something to do, and
 /// one that it finds hard.
 #[must_use]
 pub fn scenes(effect: &str) -> &'static [&'static str] {
@@ -93,11 +97,13 @@ pub fn scenes(effect: &str) -> &'static [&'static str] {
         "bloom" => &["dark-room-lights", "wet-floor"],
         // Which texels a stride meets is chance, that only several scenes even out.
         "exposure" => &["wet-floor", "corridor-grazing", "dark-room-lights"],
+        // Small and bright, and soft.
+        "environment" => &["sun", "lamps"],
         _ => &["wet-floor"],
     }
 }
 
-/// The judge of an effect with its default look on a scene. Computes the truths.
+/// The judge of an effect on a frame with its default look. Computes the truths.
 ///
 /// # Errors
 /// If there are none for the effect, or memory runs out.
@@ -113,6 +119,14 @@ pub fn judge(effect: &str, stage: &Stage) -> Result<Box<dyn Judge>, JudgeError> 
             });
         }
     })
+}
+
+/// The judge of the environment on a sky. Computes the truths.
+///
+/// # Errors
+/// If memory runs out.
+pub fn map_judge(stage: &SkyStage) -> Result<Box<dyn Judge>, JudgeError> {
+    Ok(Box::new(environment::Blurred::new(stage)?))
 }
 
 /// A measure whose smaller values are better.

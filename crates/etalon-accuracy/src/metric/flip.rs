@@ -240,9 +240,9 @@ fn light<const N: usize>(pixels: &[[f64; N]]) -> Vec<[f64; 3]> {
         .collect()
 }
 
-/// Luminance in the primaries of sRGB.
+/// Luminance in the primaries of sRGB, to the digits that the authors' program takes.
 fn luminance(pixel: &[f64; 3]) -> f64 {
-    0.212_672_85 * pixel[0] + 0.715_152_1 * pixel[1] + 0.072_174_99 * pixel[2]
+    0.2126 * pixel[0] + 0.7152 * pixel[1] + 0.0722 * pixel[2]
 }
 
 /// A picture at an exposure, tone-mapped, as 8-bit sRGB.

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use etalon_core::backend::BackendError;
 use etalon_core::plan::PlanError;
-use etalon_effects::{EffectEntry, EffectError};
+use etalon_effects::EffectError;
 use etalon_scenes::FrameSize;
 use etalon_scenes::frame::FrameError;
 use thiserror::Error;
@@ -23,7 +23,8 @@ use crate::executors::{Executor, Kind};
 use crate::judge::{self, JudgeError};
 use crate::model::Sweep;
 use crate::pictures::{PictureError, Pictures};
-use crate::stage::{Stage, StageError};
+use crate::stage::StageError;
+use crate::trial::{Swept, Trial};
 
 /// Why a sweep ended.
 #[derive(Debug, Error)]
@@ -40,6 +41,11 @@ pub enum SweepError {
     /// The size is not possible.
     #[error(transparent)]
     Size(#[from] FrameError),
+    /// Nothing is to be swept.
+    #[error(
+        "none of the effects can be tried on any of the scenes: frames are of scenes, environments of skies"
+    )]
+    Nothing,
     /// A scene cannot be had.
     #[error(transparent)]
     Stage(#[from] StageError),
@@ -76,15 +82,16 @@ pub enum Scenes {
     First,
     /// Each effect on all that it is judged on.
     Judged,
-    /// Every effect on these.
+    /// Every effect on those of these that suit it: frames are of scenes, environments
+    /// of skies.
     Named(Vec<String>),
 }
 
 /// What to sweep.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Effects; `chain` has no knobs of its own.
-    pub effects: Vec<&'static EffectEntry>,
+    /// Effects.
+    pub effects: Vec<Swept>,
     /// Scenes.
     pub scenes: Scenes,
     /// Backends; each has to be there.
@@ -143,14 +150,18 @@ pub fn sweep(
         .map_or(&[][..], |before| &before.subjects);
     let mut pairs = Vec::new();
     for &effect in &options.effects {
-        let judged = judge::scenes(effect.name);
+        let judged = judge::scenes(effect.name());
         match &options.scenes {
             Scenes::First => pairs.extend(judged.iter().take(1).map(|scene| (effect, *scene))),
             Scenes::Judged => pairs.extend(judged.iter().map(|scene| (effect, *scene))),
             Scenes::Named(names) => {
-                pairs.extend(names.iter().map(|scene| (effect, scene.as_str())));
+                let suitable = names.iter().filter(|scene| effect.suits(scene));
+                pairs.extend(suitable.map(|scene| (effect, scene.as_str())));
             }
         }
+    }
+    if pairs.is_empty() {
+        return Err(SweepError::Nothing);
     }
     let count = pairs.len();
     for (index, (effect, scene)) in pairs.into_iter().enumerate() {
@@ -159,14 +170,14 @@ pub fn sweep(
         let share = left / u32::try_from(count - index).unwrap_or(u32::MAX);
         let known = before
             .iter()
-            .find(|subject| subject.effect == effect.name && subject.scene == scene);
+            .find(|subject| subject.effect == effect.name() && subject.scene == scene);
         let mut run = Run {
             options,
             done: sweep.clone(),
             executors: &mut executors,
             kernels: etalon_effects::kernels(),
-            effect,
-            stage: Stage::new(scene, options.size)?,
+            trial: Trial::new(effect, scene, options.size)?,
+            place: [index + 1, count],
             pictures,
             progress: &mut *progress,
             notes: Vec::new(),

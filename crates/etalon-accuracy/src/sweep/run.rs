@@ -7,18 +7,17 @@ use etalon_core::graph::Graph;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan};
 use etalon_cpu::CpuBackend;
-use etalon_effects::EffectEntry;
 use etalon_effects::knob::KnobInfo;
 
 use super::{LEAST_FRAMES, Options, Progress, SweepError};
 use crate::executors::{self, Executor, Kind};
-use crate::judge::{self, Judge, JudgeError, Judgement};
+use crate::judge::{Judge, JudgeError, Judgement};
 use crate::ladder::{self, Setting};
 use crate::metric::spread;
 use crate::model::{self, ErrorKind, Outcome, Point, Subject, Sweep};
 use crate::observe::Observed;
 use crate::pictures::Pictures;
-use crate::stage::Stage;
+use crate::trial::Trial;
 use crate::work;
 
 /// Points after which what was found is kept, should the sweep be stopped.
@@ -39,8 +38,9 @@ pub(super) struct Run<'a> {
     pub(super) done: Sweep,
     pub(super) executors: &'a mut [Executor],
     pub(super) kernels: KernelLibrary,
-    pub(super) effect: &'static EffectEntry,
-    pub(super) stage: Stage,
+    pub(super) trial: Trial,
+    /// Its number among all, from 1, and how many there are.
+    pub(super) place: [usize; 2],
     pub(super) pictures: &'a Pictures,
     pub(super) progress: &'a mut dyn Progress,
     pub(super) notes: Vec<String>,
@@ -55,13 +55,17 @@ impl Run<'_> {
         share: Duration,
     ) -> Result<Subject, SweepError> {
         let begin = Instant::now();
-        let knobs = ladder::knobs(self.effect);
+        self.begin("truth", 1);
+        let knobs = ladder::knobs(&self.trial.effect());
         let candidates = self.candidates(&knobs)?;
-        let judge = judge::judge(self.effect.name, &self.stage)
+        let judge = self
+            .trial
+            .judge()
             .map_err(|source| self.error("truth", source))?;
+        self.progress.step();
         let mut subject = Subject {
-            effect: self.effect.name.to_owned(),
-            scene: self.stage.scene.to_owned(),
+            effect: self.trial.effect().name().to_owned(),
+            scene: self.trial.scene().to_owned(),
             knobs: knobs.iter().map(knob_model).collect(),
             metrics: judge.metrics(),
             facts: judge.facts(),
@@ -88,8 +92,8 @@ impl Run<'_> {
         let reference = exact_backend()?;
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
         let mut candidates: Vec<Candidate> = Vec::new();
-        for setting in ladder::settings(self.effect, self.options.depth) {
-            let graph = self.stage.graph(self.effect, &setting.values)?;
+        for setting in ladder::settings(&self.trial.effect(), self.options.depth) {
+            let graph = self.trial.graph(&setting.values)?;
             let plan = executors::plan(
                 &reference,
                 &graph,
@@ -126,8 +130,7 @@ impl Run<'_> {
         end: Instant,
         subject: &mut Subject,
     ) -> Result<(), SweepError> {
-        let what = format!("{} on {}: errors", subject.effect, subject.scene);
-        self.progress.begin(&what, candidates.len());
+        self.begin("errors", candidates.len());
         let mut exact = exact_backend()?;
         // What timing all points once more takes, as far as one can tell from here.
         let mut round = Duration::ZERO;
@@ -181,7 +184,7 @@ impl Run<'_> {
         exact: &mut CpuBackend,
         subject: &Subject,
     ) -> Result<(Point, Duration), JudgeError> {
-        let inputs = self.stage.frame.inputs();
+        let inputs = self.trial.inputs();
         let plan = executors::plan(
             exact,
             &candidate.graph,
@@ -303,9 +306,8 @@ impl Run<'_> {
             }
         }
         let rounds = self.options.frames as usize;
-        let what = format!("{} on {}: times", subject.effect, subject.scene);
-        self.progress.begin(&what, rounds * clocked.len());
-        let inputs = self.stage.frame.inputs();
+        self.begin("times", (rounds + 1) * clocked.len());
+        let inputs = self.trial.inputs();
         let mut silent = BTreeSet::new();
         // The first round warms caches and clocks up and does not count.
         'rounds: for round in 0..=rounds {
@@ -334,9 +336,7 @@ impl Run<'_> {
                         silent.insert(executor.kind.to_string());
                     }
                 }
-                if round > 0 {
-                    self.progress.step();
-                }
+                self.progress.step();
             }
         }
         for kind in silent {
@@ -349,10 +349,18 @@ impl Run<'_> {
         Ok(())
     }
 
+    /// Tells that a part of it begins.
+    fn begin(&mut self, part: &str, steps: usize) {
+        let (effect, scene) = (self.trial.effect().name(), self.trial.scene());
+        let [number, count] = self.place;
+        let what = format!("{number} of {count}, {effect} on {scene}: {part}");
+        self.progress.begin(&what, steps);
+    }
+
     fn error(&self, setting: &str, source: JudgeError) -> SweepError {
         SweepError::Judge {
-            effect: self.effect.name.to_owned(),
-            scene: self.stage.scene.to_owned(),
+            effect: self.trial.effect().name().to_owned(),
+            scene: self.trial.scene().to_owned(),
             setting: setting.to_owned(),
             source: Box::new(source),
         }

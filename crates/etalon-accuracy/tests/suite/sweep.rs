@@ -9,9 +9,10 @@ use etalon_accuracy::model::{Point, Subject, Sweep};
 use etalon_accuracy::pictures::Pictures;
 use etalon_accuracy::profile::profile;
 use etalon_accuracy::sweep::{Options, Progress, Scenes, SweepError, sweep};
+use etalon_accuracy::trial::Swept;
 use etalon_accuracy::{store, table};
 use etalon_effects::budget::{BudgetError, DeviceProfile};
-use etalon_effects::{ChainSettings, effect, effects};
+use etalon_effects::{ChainSettings, effect};
 use etalon_scenes::FrameSize;
 
 /// Keeps nothing; stops after a number of steps, as a user might.
@@ -37,7 +38,7 @@ impl Progress for Quiet {
 
 fn options(name: &str, depth: usize) -> Options {
     Options {
-        effects: vec![effect(name).unwrap()],
+        effects: vec![Swept::named(name).unwrap()],
         scenes: Scenes::Judged,
         backends: vec![Kind::Cpu],
         size: FrameSize::new(160, 90).unwrap(),
@@ -187,15 +188,14 @@ fn no_time_leaves_the_most_turned_out_and_says_so() {
 #[test]
 fn a_sweep_makes_a_profile_that_settings_are_picked_from() {
     let all = Options {
-        effects: effects()
-            .iter()
-            .filter(|effect| effect.name != "chain")
-            .collect(),
+        effects: Swept::all().collect(),
         scenes: Scenes::First,
         size: FrameSize::new(97, 55).unwrap(),
         ..options("ssr", 2)
     };
     let found = run(&all);
+    assert!(found.subjects.iter().any(|one| one.effect == "environment"));
+    // What is made once is no part of a frame's time.
     let profile = profile(&found, &found.executors[0]);
     assert_eq!((profile.size, profile.effects.len()), ([97, 55], 4));
     let picked = |budget| ChainSettings::full().for_budget(budget, &profile);
@@ -233,16 +233,23 @@ fn what_is_not_there_is_said() {
     };
     let error = sweep(&scene, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
     assert!(error.to_string().contains("wet-floor"), "{error}");
-    let chain = options("chain", 0);
     let chain = Options {
+        effects: vec![Swept::Frame(effect("chain").unwrap())],
         scenes: Scenes::Named(vec!["wet-floor".to_owned()]),
-        ..chain
+        ..options("ssr", 0)
     };
     let error = sweep(&chain, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
     assert!(
         error.to_string().contains("no truth for `chain`"),
         "{error}"
     );
+    // A scene is no sky, so that there is nothing to do.
+    let scene = Options {
+        scenes: Scenes::Named(vec!["wet-floor".to_owned()]),
+        ..options("environment", 0)
+    };
+    let error = sweep(&scene, None, &Pictures::none(), &mut Quiet::default()).unwrap_err();
+    assert!(matches!(error, SweepError::Nothing), "{error}");
 }
 
 /// More texels looked at and more halvings bring the hit nearer to the first
@@ -298,6 +305,37 @@ fn reflections_come_nearer_as_resolution_and_steps_rise() {
     }
 }
 
+/// More directions bring each level nearer to the integral, and cost look-ups in
+/// proportion. Of a sum over `n` evenly spread directions that each see as much as they
+/// stand for the error falls with `n`, its square with `n²`; what the choice of mips
+/// leaves falls as fast. Half of that slope has to be seen over the ladder.
+#[test]
+fn environments_come_nearer_as_samples_rise() {
+    let found = run(&Options {
+        size: FrameSize::new(128, 128).unwrap(),
+        ..options("environment", 1)
+    });
+    assert_eq!(found.subjects.len(), 2);
+    for subject in &found.subjects {
+        let ladder = ["16", "32", "64", "128", "256", "512", "1024"]
+            .map(|samples| at(subject, &[("samples", samples)]));
+        for pair in ladder.windows(2) {
+            let [worse, better] = [0, 1].map(|k| error(pair[k], "algorithm.colour"));
+            println!("{} {}: {worse:e} to {better:e}", subject.scene, pair[1].id);
+            assert!(better < worse, "{} {}", subject.scene, pair[1].id);
+            let [less, more] = [0, 1].map(|k| pair[k].work.texel_fetches as f64);
+            // Directions under the horizon are left out, and each takes four texels.
+            assert!((more / less - 2.0).abs() < 0.1, "{less} to {more}");
+        }
+        let [worst, best] = [0, 6].map(|k| error(ladder[k], "algorithm.colour"));
+        assert!(best < worst / 64.0, "{}: {worst} to {best}", subject.scene);
+        // The map has texels, which no number of directions makes smaller.
+        let [few, many] = [0, 6].map(|k| error(ladder[k], "model.colour"));
+        assert!(many < few, "{}: {few} to {many}", subject.scene);
+        assert!(many >= best * 0.5, "{}: {many}", subject.scene);
+    }
+}
+
 /// Rounding is far below what the algorithm leaves out, or the sweep says where not:
 /// where the algorithm is exact there is nothing else left.
 #[test]
@@ -307,6 +345,7 @@ fn rounding_is_far_below_what_the_algorithm_leaves_out_or_it_is_said() {
         ("bloom", true),
         ("exposure", false),
         ("composite", false),
+        ("environment", true),
     ] {
         let found = run(&options(name, 0));
         for subject in &found.subjects {
@@ -346,10 +385,10 @@ impl Sum {
 /// the scenes of the effect, at the size that the rule for presets says.
 #[test]
 fn no_preset_is_beaten_in_work_and_error() {
-    for effect in effects().iter().filter(|effect| effect.name != "chain") {
+    for effect in Swept::all() {
         let found = run(&Options {
             size: FrameSize::new(320, 180).unwrap(),
-            ..options(effect.name, 2)
+            ..options(effect.name(), 2)
         });
         let mut sums: BTreeMap<&str, (Sum, Option<&str>)> = BTreeMap::new();
         for subject in &found.subjects {
@@ -368,13 +407,13 @@ fn no_preset_is_beaten_in_work_and_error() {
             }
         }
         let presets = sums.iter().filter(|(_, (_, preset))| preset.is_some());
-        assert!(presets.clone().count() > 0, "{}", effect.name);
+        assert!(presets.clone().count() > 0, "{}", effect.name());
         for (id, (sum, preset)) in presets {
             for (other_id, (other, _)) in &sums {
                 assert!(
                     !other.beats(sum),
                     "{} {preset:?}: {other_id} with {other:?} beats {id} with {sum:?}",
-                    effect.name
+                    effect.name()
                 );
             }
         }

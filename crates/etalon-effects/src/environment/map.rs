@@ -37,7 +37,7 @@ pub(super) fn check_side(side: u32) -> Result<(), SettingError> {
 }
 
 /// Mips down to 16 texels.
-fn mips(side: u32) -> u32 {
+pub(super) fn mips(side: u32) -> u32 {
     side.ilog2() - 3
 }
 
@@ -47,15 +47,17 @@ pub(super) fn image_size(side: u32) -> [u32; 2] {
 }
 
 /// The upper left corner of a mip in it.
-fn corner(side: u32, mip: u32) -> [u32; 2] {
+pub(super) fn corner(side: u32, mip: u32) -> [u32; 2] {
     match mip {
         0 => [0, 0],
         _ => [side, side - (side >> (mip - 1))],
     }
 }
 
-/// The direction at uv of an equirectangular picture.
-pub(super) fn direction(u: f64, v: f64) -> DVec3 {
+/// The unit direction at a place of an equirectangular picture, from 0 at the left and
+/// at the top to 1, laid out as for [`EnvironmentMap`].
+#[must_use]
+pub fn direction(u: f64, v: f64) -> DVec3 {
     let (turn, tilt) = ((u - 0.5) * TAU, v * PI);
     let across = tilt.sin();
     DVec3::new(across * turn.sin(), tilt.cos(), -across * turn.cos())
@@ -190,13 +192,13 @@ fn folded(p: DVec2) -> DVec2 {
 }
 
 /// As in `lib/octahedral`.
-fn octahedral(direction: DVec3) -> DVec2 {
+pub(super) fn octahedral(direction: DVec3) -> DVec2 {
     let p = DVec2::new(direction.x, direction.z) / direction.abs().element_sum();
     if direction.y < 0.0 { folded(p) } else { p }
 }
 
 /// As in `lib/octahedral`.
-fn octahedral_direction(place: DVec2) -> DVec3 {
+pub(super) fn octahedral_direction(place: DVec2) -> DVec3 {
     let mut p = place;
     if p.x.abs() > 1.0 {
         p = DVec2::new(sign(p.x) * (2.0 - p.x.abs()), -p.y);

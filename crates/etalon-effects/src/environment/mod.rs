@@ -15,6 +15,7 @@
 
 mod irradiance;
 mod map;
+pub mod truth;
 
 use std::f64::consts::TAU;
 
@@ -24,11 +25,12 @@ use etalon_core::resource::TextureDesc;
 use glam::{DMat4, Mat4, Vec2, Vec3};
 
 pub use irradiance::Irradiance;
-pub use map::EnvironmentMap;
+pub use map::{EnvironmentMap, direction};
 
 use crate::bloom::LINEAR;
 use crate::check::Settings;
 use crate::geometry::View;
+use crate::knob::{Tunable, knobs};
 use crate::{EffectError, SettingError};
 
 /// An environment, ready to light surfaces.
@@ -66,6 +68,10 @@ pub struct Prefilter {
     pub samples: u32,
 }
 
+knobs!(Prefilter, "environment" {
+    count samples [16, 1024] "directions", Accuracy [16, 32, 64, 128, 256, 512, 1024], "directions for each texel, a power of two";
+});
+
 impl Default for Prefilter {
     /// 64 directions.
     fn default() -> Self {
@@ -79,14 +85,13 @@ impl Prefilter {
     /// # Errors
     /// If it is not a power of two within its range.
     pub fn validate(&self) -> Result<(), SettingError> {
-        let check = Settings("environment");
-        check.count("samples", self.samples, 16, 1024)?;
+        self.check_knobs()?;
         if self.samples.is_power_of_two() {
             return Ok(());
         }
         // The nearest range that it is outside of.
         let next = self.samples.next_power_of_two();
-        check.count("samples", self.samples, next, 1024)
+        Settings(Self::EFFECT).count("samples", self.samples, next, 1024)
     }
 }
 

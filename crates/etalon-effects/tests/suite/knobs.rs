@@ -10,11 +10,15 @@ use etalon_core::Format;
 use etalon_core::kernel::Arithmetic;
 use etalon_effects::bloom::{Bloom, LightStorage, bloom};
 use etalon_effects::composite::Composite;
+use etalon_effects::environment::Prefilter;
 use etalon_effects::exposure::{Exposed, Exposure};
-use etalon_effects::knob::{Domain, KnobError, KnobValue, Role, Tunable, tuned};
+use etalon_effects::knob::{Domain, KnobError, KnobInfo, KnobValue, Role, Tunable, tuned};
 use etalon_effects::quality::{Quality, preset};
+use etalon_effects::registry::WITHOUT_KNOBS;
 use etalon_effects::ssr::{HitStorage, Search, Ssr, march};
-use etalon_effects::{CameraParams, ChainSettings, EffectError, chain, effect, effects};
+use etalon_effects::{
+    CameraParams, ChainSettings, EffectError, chain, effect, effects, map_effects,
+};
 
 /// What any table has to be.
 fn check<S: Tunable + Debug + PartialEq>() {
@@ -86,24 +90,40 @@ fn tables_say_what_the_structs_hold() {
     check::<Exposure>();
     check::<Bloom>();
     check::<Composite>();
+    check::<Prefilter>();
+}
+
+/// Every effect with knobs, by name.
+fn knobs_of_all() -> Vec<(&'static str, Vec<KnobInfo>)> {
+    let frames = effects().iter().map(|entry| (entry.name, entry.knobs()));
+    let maps = map_effects()
+        .iter()
+        .map(|entry| (entry.name, entry.knobs()));
+    frames.chain(maps).collect()
+}
+
+#[test]
+fn every_effect_has_one_entry() {
+    let mut names: Vec<&str> = knobs_of_all().into_iter().map(|(name, _)| name).collect();
+    names.extend(WITHOUT_KNOBS.iter().map(|(name, _)| *name));
+    let distinct: BTreeSet<&str> = names.iter().copied().collect();
+    assert_eq!(distinct.len(), names.len(), "{names:?}");
 }
 
 #[test]
 fn presets_set_accuracy_and_nothing_else() {
-    for entry in effects() {
+    for (effect, knobs) in knobs_of_all() {
         let mut before: Option<&[(&str, KnobValue)]> = None;
         for quality in Quality::ALL {
-            let values = preset(entry.name, quality);
+            let values = preset(effect, quality);
             for (name, value) in values {
-                let knobs = entry.knobs();
                 let knob = knobs.iter().find(|knob| knob.name == *name);
-                let knob = knob.unwrap_or_else(|| panic!("{} has no {name}", entry.name));
+                let knob = knob.unwrap_or_else(|| panic!("{effect} has no {name}"));
                 assert_eq!(knob.role, Role::Accuracy, "{name}");
                 assert!(knob.domain.contains(*value), "{name} = {value}");
             }
-            let has_knobs = entry.knobs().iter().any(|knob| knob.role == Role::Accuracy);
-            if has_knobs {
-                assert_ne!(before, Some(values), "{} {quality}", entry.name);
+            if knobs.iter().any(|knob| knob.role == Role::Accuracy) {
+                assert_ne!(before, Some(values), "{effect} {quality}");
             }
             before = Some(values);
         }
@@ -119,6 +139,7 @@ fn presets_set_accuracy_and_nothing_else() {
         assert_eq!(settings.ssr, Some(Ssr::preset(quality)));
         assert_eq!(settings.bloom, Some(Bloom::preset(quality)));
         assert_eq!(settings.exposure, Some(Exposure::preset(quality)));
+        assert_eq!(Prefilter::preset(quality).validate(), Ok(()));
     }
 }
 

@@ -6,6 +6,7 @@ mod checks;
 mod common;
 mod composite;
 mod demand;
+mod environment;
 mod exposure;
 mod fast;
 mod forward_plan;

@@ -19,6 +19,8 @@
 //! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
 //! * [`mutate`]: whether anything is found where a kernel's guard is missing;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
+//! * [`per_driver`]: the same on every Vulkan driver that [`drivers`] finds, a process
+//!   for each;
 //! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
 //!
 //! ```
@@ -40,6 +42,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod drivers;
 pub mod executors;
 pub mod functions;
 pub mod judge;
@@ -48,6 +51,7 @@ pub mod knobs;
 pub mod model;
 pub mod mutate;
 pub mod observe;
+pub mod per_driver;
 pub mod plant;
 pub mod report;
 pub mod run;

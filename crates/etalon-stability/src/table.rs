@@ -26,6 +26,9 @@ pub fn text(report: &Report) -> String {
     for note in &report.notes {
         let _ = writeln!(out, "{note}");
     }
+    for failure in &report.failures {
+        let _ = writeln!(out, "FAILED {failure}");
+    }
     families(&mut out, report);
     rows(&mut out, report);
     sites(&mut out, report);

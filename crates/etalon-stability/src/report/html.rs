@@ -70,6 +70,9 @@ fn executors(body: &mut String, report: &Report) {
     for note in &report.notes {
         let _ = writeln!(body, "<p class=\"muted\">{}</p>", escape(note));
     }
+    for failure in &report.failures {
+        let _ = writeln!(body, "<p class=\"findings\">{}</p>", escape(failure));
+    }
 }
 
 fn cases(body: &mut String, report: &Report) {

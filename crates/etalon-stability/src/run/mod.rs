@@ -11,7 +11,7 @@ use thiserror::Error;
 use crate::executors::{Executor, Kind};
 use crate::functions;
 use crate::knobs;
-use crate::model::{ExecutorInfo, Report, Totals};
+use crate::model::{ExecutorInfo, Report};
 use crate::plant::Plant;
 use crate::sanitise::{AllowError, Watch};
 use crate::subject::{Subject, SubjectError, subjects};
@@ -123,7 +123,6 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
         kernels.add_source(path, text);
     }
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
-    let mut named = std::collections::BTreeSet::new();
     for (subject, effects) in &chosen {
         let steps = subject.steps()?;
         let pixels = steps.first().map_or(0, |step| step.frame.size().pixels());
@@ -132,7 +131,6 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
         }
         for effect in effects {
             progress.next(&subject.name, effect.name);
-            named.insert(subject.name.clone());
             let pair = Pair {
                 subject,
                 effect,
@@ -146,7 +144,6 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     }
     if options.cases.is_empty() && options.asks_for(functions::LIBRARY) {
         let functions = functions::run(&mut executors, &mut watch, &options.kernels);
-        named.extend(functions.iter().map(|case| case.name.clone()));
         report.cases.extend(functions);
     }
     // Values that are not allowed cost no execution: they are tried whenever no
@@ -165,21 +162,11 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
         report.maps.push(found.map);
     }
     // Of a part of the corpus nothing can be said of what is not found.
-    if options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none() {
+    let whole = options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none();
+    if whole && options.executors.contains(&Kind::Sanitiser) {
         report.unused = unused;
     }
-    report.totals = Totals {
-        cases: named.len(),
-        pairs: report.cases.len(),
-        executions: report
-            .cases
-            .iter()
-            .flat_map(|case| &case.results)
-            .map(|result| result.executions)
-            .sum(),
-        refusals: report.refusals.len(),
-        findings: report.findings().count() + report.accepted().count(),
-    };
+    report.count();
     Ok(report)
 }
 

@@ -11,7 +11,8 @@
 //! * and at which operation of which kernel did it lose its digits, or decide what
 //!   `f64` would not?
 //!
-//! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
+//! * [`subject`], [`scene`]: what is run: the corpus, and [`knobs`] at and beyond their
+//!   ends;
 //! * [`functions`]: the kernels' library by itself;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
 //! * [`kernels`]: kernels of a folder, to try a formula;
@@ -56,6 +57,7 @@ pub mod plant;
 pub mod report;
 pub mod run;
 pub mod sanitise;
+pub mod scene;
 pub mod subject;
 pub mod table;
 mod text;

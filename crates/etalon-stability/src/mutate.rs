@@ -12,12 +12,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use etalon_effects::effect;
 use serde::{Deserialize, Serialize};
 
 use crate::executors::Kind;
 use crate::functions::LIBRARY;
 use crate::model::Report;
+use crate::scene::Effect;
 use crate::run::{Options, RunError, run};
 
 /// What begins such a comment.
@@ -186,7 +186,7 @@ fn users<'a>(path: &str, files: impl IntoIterator<Item = (&'a str, &'a str)>) ->
         }
     }
     let folders = found.iter().filter_map(|path| path.split('/').next());
-    let known = |folder: &&str| *folder == LIBRARY || effect(folder).is_some();
+    let known = |folder: &&str| *folder == LIBRARY || Effect::names().any(|name| name == *folder);
     let folders: BTreeSet<&str> = folders.filter(known).collect();
     folders.into_iter().map(str::to_owned).collect()
 }

@@ -4,7 +4,6 @@ mod conclude;
 mod pair;
 
 use etalon_core::backend::BackendError;
-use etalon_effects::{EffectEntry, effect, effects};
 use etalon_scenes::cases::case;
 use thiserror::Error;
 
@@ -14,6 +13,7 @@ use crate::knobs;
 use crate::model::{ExecutorInfo, Report};
 use crate::plant::Plant;
 use crate::sanitise::{AllowError, Watch};
+use crate::scene::Effect;
 use crate::subject::{Subject, SubjectError, subjects};
 pub(crate) use conclude::conclusions;
 use pair::Pair;
@@ -80,7 +80,7 @@ impl Progress for () {}
 #[non_exhaustive]
 pub enum RunError {
     /// No effect of that name.
-    #[error("there is no effect `{name}`; there are {}, and lib", effects().iter().map(|effect| effect.name).collect::<Vec<_>>().join(", "))]
+    #[error("there is no effect `{name}`; there are {}, and lib", Effect::names().collect::<Vec<_>>().join(", "))]
     NoEffect {
         /// As given.
         name: String,
@@ -124,17 +124,17 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     }
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
     for (subject, effects) in &chosen {
-        let steps = subject.steps()?;
-        let pixels = steps.first().map_or(0, |step| step.frame.size().pixels());
+        let scenes = subject.scenes()?;
+        let pixels = scenes.first().map_or(0, |scene| scene.size().pixels());
         if options.largest.is_some_and(|largest| pixels > largest) {
             continue;
         }
         for effect in effects {
-            progress.next(&subject.name, effect.name);
+            progress.next(&subject.name, effect.name());
             let pair = Pair {
                 subject,
                 effect,
-                steps: &steps,
+                scenes: &scenes,
                 kernels: &kernels,
                 plant: options.plant,
                 followed: pixels <= options.followed,
@@ -171,9 +171,9 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
 }
 
 /// The cases asked for with their effects.
-fn choose(options: &Options) -> Result<Vec<(Subject, Vec<EffectEntry>)>, RunError> {
+fn choose(options: &Options) -> Result<Vec<(Subject, Vec<Effect>)>, RunError> {
     for name in &options.effects {
-        if effect(name).is_none() && name != functions::LIBRARY {
+        if !Effect::names().any(|known| known == name) && name != functions::LIBRARY {
             return Err(RunError::NoEffect { name: name.clone() });
         }
     }
@@ -194,7 +194,7 @@ fn choose(options: &Options) -> Result<Vec<(Subject, Vec<EffectEntry>)>, RunErro
                 .effects
                 .iter()
                 .copied()
-                .filter(|effect| options.asks_for(effect.name));
+                .filter(|effect| options.asks_for(effect.name()));
             let effects = effects.collect();
             (subject, effects)
         })

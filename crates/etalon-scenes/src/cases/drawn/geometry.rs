@@ -352,6 +352,12 @@ pub(super) const CASES: &[DrawnCase] = &[
         || from(at(0.3, 0.0, 4.0)),
     ),
     DrawnCase::new(
+        "velocity-from-next-to-the-eyes-plane",
+        "w was 1e-6: a place a million pictures away, which no mark for other velocities may equal",
+        "Bevy motion blur (clip w of the previous frame)",
+        || from(at(2.0, 1.0, 4.0 - 1e-6)),
+    ),
+    DrawnCase::new(
         "velocity-through-the-eyes-plane",
         "w changes its sign within the triangle: a tiny one somewhere, and quotients without bound",
         "Bevy motion blur (clip w of the previous frame)",

@@ -1,7 +1,5 @@
 //! Light from all directions, as a case gives it.
 
-use std::f64::consts::PI;
-
 use etalon_core::Format;
 use etalon_core::backend::Inputs;
 use etalon_core::graph::{Graph, Texture};
@@ -135,18 +133,5 @@ impl LightMap {
             graph.output("mirroring", table)?;
         }
         Ok(graph)
-    }
-
-    /// How far the irradiance of uniform light is from π times it, relative; `None` if
-    /// the light is not uniform.
-    #[must_use]
-    pub fn irradiance_error(&self) -> Option<f64> {
-        let exact = self.uniform? * PI;
-        let axes = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE.normalize()];
-        let errors = axes.into_iter().flat_map(|axis| {
-            let off = [axis, -axis].map(|normal| (self.irradiance.at(normal) - exact).abs());
-            off.map(|off| (off / exact.max(DVec3::splat(f64::MIN_POSITIVE))).max_element())
-        });
-        Some(errors.fold(0.0, f64::max))
     }
 }

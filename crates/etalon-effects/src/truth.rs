@@ -13,8 +13,8 @@
 //! are not rounded to any format.
 //!
 //! [`ssr`](crate::ssr::truth), [`bloom`](crate::bloom::truth),
-//! [`exposure`](crate::exposure::truth) and [`composite`](crate::composite::truth)
-//! each have one.
+//! [`exposure`](crate::exposure::truth), [`composite`](crate::composite::truth) and
+//! [`lighting`](crate::lighting::truth) each have one.
 
 use etalon_core::Format;
 use etalon_core::image::{ImageData, ImageError};

@@ -17,6 +17,7 @@
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
 //! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
+//! * [`exceptions`]: what of that drivers are known for;
 //! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
 //! * [`mutate`]: whether anything is found where a kernel's guard is missing;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
@@ -44,6 +45,7 @@
 #![forbid(unsafe_code)]
 
 pub mod drivers;
+pub mod exceptions;
 pub mod executors;
 pub mod functions;
 pub mod judge;

@@ -146,7 +146,10 @@ impl Arguments {
         shown.0.finish_and_clear();
         let found = found.map_err(|error| error.to_string())?;
         if self.data {
-            print!("{}", report::json(&found).map_err(|error| error.to_string())?);
+            print!(
+                "{}",
+                report::json(&found).map_err(|error| error.to_string())?
+            );
             return Ok(found.is_sound());
         }
         print!("{}", table::text(&found));

@@ -126,6 +126,8 @@ pub struct CaseReport {
     pub results: Vec<ExecutorResult>,
     /// What should not be.
     pub findings: Vec<Finding>,
+    /// What should not be and a driver is known for.
+    pub excused: Vec<Excused>,
 }
 
 impl CaseReport {
@@ -242,6 +244,15 @@ pub struct Finding {
     pub executor: String,
     /// What and where.
     pub text: String,
+}
+
+/// A finding that an exception is about.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Excused {
+    /// What was found.
+    pub finding: Finding,
+    /// Why the driver is known for it.
+    pub reason: String,
 }
 
 /// What was said to a value that is not allowed.

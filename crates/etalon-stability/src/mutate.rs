@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 use crate::executors::Kind;
 use crate::functions::LIBRARY;
 use crate::model::Report;
-use crate::scene::Effect;
 use crate::run::{Options, RunError, run};
+use crate::scene::Effect;
 
 /// What begins such a comment.
 pub(crate) const MARK: &str = "// unguarded: ";

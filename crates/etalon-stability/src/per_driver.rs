@@ -73,10 +73,8 @@ pub fn run_on(
     drivers: &[Driver],
     progress: &mut dyn Progress,
 ) -> Result<Report, RunError> {
-    let (devices, here): (Vec<Kind>, Vec<Kind>) = options
-        .executors
-        .iter()
-        .partition(|kind| kind.is_device());
+    let (devices, here): (Vec<Kind>, Vec<Kind>) =
+        options.executors.iter().partition(|kind| kind.is_device());
     let held_to = [Kind::Cpu, Kind::Perturbed];
     let there = held_to.iter().filter(|kind| here.contains(kind));
     let there: Vec<&str> = there.chain(&devices).map(|kind| kind.name()).collect();
@@ -134,7 +132,9 @@ fn merge(report: &mut Report, driver: &str, own: Report) {
         }
     }
     let notes = own.notes.into_iter();
-    report.notes.extend(notes.map(|note| format!("{driver}: {note}")));
+    report
+        .notes
+        .extend(notes.map(|note| format!("{driver}: {note}")));
     let mut cases: BTreeMap<(String, String), &mut CaseReport> = report
         .cases
         .iter_mut()
@@ -158,9 +158,14 @@ fn merge(report: &mut Report, driver: &str, own: Report) {
                 case.findings.push(Finding {
                     kind: FindingKind::Disagreement,
                     executor: named(&result.executor),
-                    text: "the interpreter does not store the same bits in every process".to_owned(),
+                    text: "the interpreter does not store the same bits in every process"
+                        .to_owned(),
                 });
             }
+        }
+        for mut excused in own.excused {
+            excused.finding.executor = named(&excused.finding.executor);
+            case.excused.push(excused);
         }
         for mut finding in own.findings {
             if is_device(&finding.executor) {
@@ -229,7 +234,11 @@ mod tests {
             merge(&mut all, name, own);
         }
         all.count();
-        let names: Vec<_> = all.executors.iter().map(|info| info.name.as_str()).collect();
+        let names: Vec<_> = all
+            .executors
+            .iter()
+            .map(|info| info.name.as_str())
+            .collect();
         assert_eq!(names, ["cpu", "ash/lavapipe", "ash/swiftshader"]);
         assert!(all.cases[0].on("ash/swiftshader").is_some());
         // What the interpreter finds is found here, once.
@@ -241,7 +250,11 @@ mod tests {
     #[test]
     fn an_interpreter_of_other_bits_is_found() {
         let mut all = report(vec![result("cpu", Some(1))], &[]);
-        merge(&mut all, "lavapipe", report(vec![result("cpu", Some(2))], &[]));
+        merge(
+            &mut all,
+            "lavapipe",
+            report(vec![result("cpu", Some(2))], &[]),
+        );
         let (_, found) = all.findings().next().unwrap();
         assert_eq!(found.kind, FindingKind::Disagreement);
     }
@@ -255,7 +268,10 @@ mod tests {
                 .to_vec(),
         };
         let reason = on_driver(&child, &driver("x"), "cpu").unwrap_err();
-        assert!(reason.contains("3") && reason.contains("no such device"), "{reason}");
+        assert!(
+            reason.contains("3") && reason.contains("no such device"),
+            "{reason}"
+        );
         let mut report = Report::default();
         report.failures.push(reason);
         report.count();
@@ -268,11 +284,15 @@ mod tests {
         let found = || vec![driver("lavapipe"), driver("radv")];
         let names = |asked: &[&str]| {
             let asked: Vec<String> = asked.iter().map(|name| (*name).to_owned()).collect();
-            chosen(found(), &asked).map(|some| some.into_iter().map(|one| one.name).collect::<Vec<_>>())
+            chosen(found(), &asked)
+                .map(|some| some.into_iter().map(|one| one.name).collect::<Vec<_>>())
         };
         assert_eq!(names(&["all"]).unwrap(), ["lavapipe", "radv"]);
         assert_eq!(names(&["radv"]).unwrap(), ["radv"]);
         let error = names(&["nvk"]).unwrap_err().to_string();
-        assert!(error.contains("nvk") && error.contains("lavapipe, radv"), "{error}");
+        assert!(
+            error.contains("nvk") && error.contains("lavapipe, radv"),
+            "{error}"
+        );
     }
 }

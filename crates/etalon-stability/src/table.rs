@@ -43,6 +43,22 @@ pub fn text(report: &Report) -> String {
             case.effect, case.name, finding.executor, finding.text
         );
     }
+    let excused = || {
+        report
+            .cases
+            .iter()
+            .flat_map(|case| case.excused.iter().map(move |one| (case, one)))
+    };
+    if excused().next().is_some() {
+        let _ = writeln!(out, "\nKnown of drivers");
+    }
+    for (case, one) in excused() {
+        let _ = writeln!(
+            out,
+            "  {} on {}, {}: {} ({})",
+            case.effect, case.name, one.finding.executor, one.reason, one.finding.text
+        );
+    }
     for refusal in report.accepted() {
         let _ = writeln!(
             out,

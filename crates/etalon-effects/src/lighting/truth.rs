@@ -122,7 +122,10 @@ impl Point {
     /// Where a light is seen, and its irradiance on a plane that faces it.
     fn arriving(&self, light: &PunctualLight, view: &View) -> (DVec3, DVec3) {
         let power = light.power.as_dvec3();
-        let shines = view.view.transform_vector3(light.direction).normalize_or(DVec3::NEG_Z);
+        let shines = view
+            .view
+            .transform_vector3(light.direction)
+            .normalize_or(DVec3::NEG_Z);
         if light.kind == LightKind::Directional {
             return (-shines, power);
         }

@@ -45,7 +45,9 @@ pub fn look(frame: usize, stores: &[Store], overflows: bool, found: &mut Option<
             // Formats that clamp would hide it.
             for (index, texel) in store.wide.iter().flatten().enumerate() {
                 for (channel, value) in texel.iter().enumerate() {
-                    if !(value.is_finite() || overflows && *value == f64::INFINITY) && channel < format.channels() as usize {
+                    if !(value.is_finite() || overflows && *value == f64::INFINITY)
+                        && channel < format.channels() as usize
+                    {
                         report(index, channel);
                     }
                 }

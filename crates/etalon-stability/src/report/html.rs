@@ -144,6 +144,15 @@ fn row(body: &mut String, case: &CaseReport) {
         }
         body.push_str("</ul>");
     }
+    for one in &case.excused {
+        let _ = write!(
+            body,
+            "<br><span class=\"muted\">{}: {}, {}</span>",
+            escape(&one.finding.executor),
+            escape(&one.reason),
+            escape(&one.finding.text)
+        );
+    }
     let place = rounding.map_or_else(String::new, |one| {
         format!(" title=\"{}\"", escape(&one.at.to_string()))
     });

@@ -7,6 +7,7 @@ use etalon_core::backend::BackendError;
 use etalon_scenes::cases::case;
 use thiserror::Error;
 
+use crate::exceptions::{BadLine, exceptions};
 use crate::executors::{Executor, Kind};
 use crate::functions;
 use crate::knobs;
@@ -97,6 +98,9 @@ pub enum RunError {
     /// A comment in a kernel that is for the sanitiser cannot be understood.
     #[error(transparent)]
     Allow(#[from] AllowError),
+    /// A line of the table of exceptions cannot be understood.
+    #[error(transparent)]
+    Exception(#[from] BadLine),
     /// An executor that `ETALON_REQUIRE` names is not there.
     #[error("{name} is required: {source}")]
     Required {
@@ -118,6 +122,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
     let mut watch = Watch::new()?;
+    let exceptions = exceptions()?;
     let mut kernels = etalon_effects::kernels();
     for (path, text) in &options.kernels {
         kernels.add_source(path, text);
@@ -136,6 +141,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
                 effect,
                 scenes: &scenes,
                 kernels: &kernels,
+                exceptions: &exceptions,
                 plant: options.plant,
                 followed: pixels <= options.followed,
             };

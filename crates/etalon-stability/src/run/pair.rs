@@ -8,16 +8,19 @@ use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_core::resource::Limits;
 use etalon_cpu::StepSanitised;
+use etalon_effects::EffectError;
 use etalon_effects::knob::KnobValue;
 use etalon_effects::ssr::Ssr;
-use etalon_effects::EffectError;
 use thiserror::Error;
 
 use super::conclude::conclusions;
+use crate::exceptions::Exception;
 use crate::executors::{Executor, Kind};
 use crate::judge::spread::{PERTURBATIONS, Spread};
 use crate::judge::{agreement, drawn, finite, recovery, rounding, truth};
-use crate::model::{CaseReport, ExecutorResult, ExpectedError, Finding, FindingKind, Status};
+use crate::model::{
+    CaseReport, Excused, ExecutorResult, ExpectedError, Finding, FindingKind, Status,
+};
 use crate::observe::{ObserveError, Store};
 use crate::plant::Plant;
 use crate::sanitise::{Counts, Watch};
@@ -57,6 +60,8 @@ pub(super) struct Pair<'a> {
     pub(super) scenes: &'a [Scene],
     pub(super) kernels: &'a KernelLibrary,
     pub(super) plant: Option<Plant>,
+    /// What drivers are known to do otherwise.
+    pub(super) exceptions: &'a [Exception],
     /// Whether the frame is small enough for [`Kind::is_costly`].
     pub(super) followed: bool,
 }
@@ -128,10 +133,28 @@ impl Pair<'_> {
             {
                 continue;
             }
-            let result = self.on(executor, watch, &mut kept, &mut report.findings);
+            let mut findings = Vec::new();
+            let result = self.on(executor, watch, &mut kept, &mut findings);
             report.results.push(result);
+            match self.exception(executor) {
+                Some(exception) => report.excused.extend(findings.into_iter().map(|finding| {
+                    let reason = exception.reason.clone();
+                    Excused { finding, reason }
+                })),
+                None => report.findings.append(&mut findings),
+            }
         }
         report
+    }
+
+    /// What an executor's driver is known for in this case.
+    fn exception(&self, executor: &Executor) -> Option<&Exception> {
+        if !executor.kind.is_device() {
+            return None;
+        }
+        let device = executor.info().device;
+        let mut exceptions = self.exceptions.iter();
+        exceptions.find(|one| one.excuses(&self.subject.name, self.effect.name(), &device))
     }
 
     /// Runs it on one executor, and keeps what others are held to.
@@ -199,7 +222,11 @@ impl Pair<'_> {
                     findings.extend(watch.checked(kind, executor.take_checked()));
                     let steps = executor.take_sanitised();
                     let counts = result.sanitised.get_or_insert_default();
-                    let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name());
+                    let case = format!(
+                        "{}, {}, {arithmetic}",
+                        self.subject.name,
+                        self.effect.name()
+                    );
                     findings.extend(watch.look(&case, &steps, self.expected(), counts));
                     decisions(&steps, &frames, kept.double(arithmetic), counts);
                 }
@@ -272,7 +299,8 @@ impl Pair<'_> {
 
     /// What of a case's frames is not what the effect's truth says.
     fn truth(&self, frames: &Frames) -> Option<truth::Untrue> {
-        let mut judge = truth::Judge::new(self.effect.name(), &self.subject.knobs, self.expected())?;
+        let mut judge =
+            truth::Judge::new(self.effect.name(), &self.subject.knobs, self.expected())?;
         for (number, (scene, stores)) in self.scenes.iter().zip(frames).enumerate() {
             judge.look(number, scene, stores);
         }

@@ -2,6 +2,7 @@
 
 use std::process::Command;
 
+use etalon_stability::drivers;
 use etalon_stability::executors::Kind;
 use etalon_stability::model::{FindingKind, Report};
 use etalon_stability::plant::{Fault, Plant};
@@ -103,6 +104,88 @@ fn a_bit_is_found_on_a_device() {
             .unwrap();
         assert_eq!((wrong.texels, wrong.ulps), (1, 1));
         assert_eq!((wrong.first.x, wrong.first.y), (0, 0));
+    }
+}
+
+/// One case of each effect that draws or lights, with a fault.
+fn drawn(plant: Option<Plant>) -> Report {
+    let cases = [
+        "triangle-across-the-near-plane",
+        "lamp-at-the-eye",
+        "map-of-one",
+        "drawn-normal-zero",
+    ];
+    let options = Options {
+        cases: cases.map(str::to_owned).to_vec(),
+        executors: vec![Kind::Cpu, Kind::Wgpu, Kind::Ash],
+        plant,
+        ..Options::default()
+    };
+    run(&options, &mut ()).unwrap()
+}
+
+/// The effects in which something of a kind is found.
+fn effects(report: &Report, kind: FindingKind) -> Vec<&str> {
+    let found = report.findings().filter(|(_, found)| found.kind == kind);
+    found.map(|(case, _)| case.effect.as_str()).collect()
+}
+
+#[test]
+fn what_is_drawn_is_held_to_its_truth() {
+    let report = drawn(None);
+    assert!(
+        report.is_sound(),
+        "{:?}",
+        report.findings().collect::<Vec<_>>()
+    );
+    let (executor, fault) = (Kind::Cpu, Fault::Error);
+    let report = drawn(Some(Plant { executor, fault }));
+    // The first store of forward shading is light, of which there is no truth here.
+    let untrue = effects(&report, FindingKind::Untrue);
+    assert_eq!(untrue, ["geometry", "lighting", "environment"]);
+}
+
+#[test]
+fn what_devices_draw_is_held_to_the_interpreter_and_to_each_other() {
+    let (executor, fault) = (Kind::Wgpu, Fault::Error);
+    let report = drawn(Some(Plant { executor, fault }));
+    if report.executors.len() < 3 {
+        eprintln!("without devices: {:?}", report.notes);
+        return;
+    }
+    let all = ["geometry", "lighting", "environment", "forward"];
+    let on = |report: &Report, executor: &str| -> Vec<String> {
+        let found = report.findings().filter(|(_, found)| {
+            found.kind == FindingKind::Disagreement && found.executor == executor
+        });
+        found.map(|(case, _)| case.effect.clone()).collect()
+    };
+    assert_eq!(on(&report, "wgpu"), all);
+    // A bit is within what rasterisers are free to do, but not of the same device.
+    let (executor, fault) = (Kind::Ash, Fault::Bit);
+    let report = drawn(Some(Plant { executor, fault }));
+    assert_eq!(on(&report, "ash"), all);
+}
+
+#[test]
+fn every_driver_has_its_own_process() {
+    let arguments = ["--case", "size-3x3", "--effect", "bloom"];
+    let on = |drivers: &str| {
+        let chosen = ["--executor", "cpu,ash", "--drivers", drivers];
+        program(&[&arguments[..], &chosen].concat())
+    };
+    let (status, text) = on("no-such-driver");
+    assert_eq!(status, Some(2), "{text}");
+    assert!(text.contains("no driver `no-such-driver`"), "{text}");
+    let found = drivers::find(&drivers::Environment::of_process()).drivers;
+    if found.is_empty() {
+        eprintln!("no drivers here");
+        return;
+    }
+    let (status, text) = on("all");
+    assert_eq!(status, Some(0), "{text}");
+    for driver in found {
+        assert!(text.contains(&format!("ash/{}", driver.name)), "{text}");
     }
 }
 

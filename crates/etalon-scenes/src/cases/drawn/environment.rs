@@ -38,7 +38,11 @@ pub(super) const CASES: &[DrawnCase] = &[
         "J. Křivánek and M. Colbert, Real-time Shading with Filtered Importance Sampling, 2008",
         || {
             LightMap::painted([64, 32], 32, |x, y| {
-                if (x, y) == (40, 9) { [MOST; 3] } else { [0.0; 3] }
+                if (x, y) == (40, 9) {
+                    [MOST; 3]
+                } else {
+                    [0.0; 3]
+                }
             })?
             .staged()
         },
@@ -59,9 +63,13 @@ pub(super) const CASES: &[DrawnCase] = &[
         "a sun straight below, at the four corners of the octahedron: one direction, four texels",
         "Z. Cigolle et al., A Survey of Efficient Representations for Independent Unit Vectors, 2014",
         || {
-            LightMap::painted([32, 16], 32, |_, y| {
-                if y == 15 { [MOST; 3] } else { [0.0; 3] }
-            })?
+            LightMap::painted(
+                [32, 16],
+                32,
+                |_, y| {
+                    if y == 15 { [MOST; 3] } else { [0.0; 3] }
+                },
+            )?
             .staged()
         },
     ),
@@ -95,9 +103,13 @@ pub(super) const CASES: &[DrawnCase] = &[
         "1e30 from one side: as a half float it would be infinite",
         "Filament #2362",
         || {
-            LightMap::painted([24, 12], 32, |x, _| {
-                if x < 3 { [1e30; 3] } else { [1.0; 3] }
-            })?
+            LightMap::painted(
+                [24, 12],
+                32,
+                |x, _| {
+                    if x < 3 { [1e30; 3] } else { [1.0; 3] }
+                },
+            )?
             .staged()
         },
     ),
@@ -125,7 +137,11 @@ pub(super) const CASES: &[DrawnCase] = &[
         "J. Křivánek and M. Colbert, Real-time Shading with Filtered Importance Sampling, 2008",
         || {
             LightMap::painted([64, 32], 64, |x, y| {
-                if (x + y) % 2 == 0 { [MOST; 3] } else { [0.0; 3] }
+                if (x + y) % 2 == 0 {
+                    [MOST; 3]
+                } else {
+                    [0.0; 3]
+                }
             })?
             .staged()
         },

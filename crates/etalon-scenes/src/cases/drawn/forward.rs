@@ -25,14 +25,19 @@ fn at(x: f64, y: f64, z: f64) -> DMat4 {
 }
 
 /// Light over light in a target.
-const OVER: &str = "the target blends light of up to 65504 over light; what reads it takes infinity for 65504";
+const OVER: &str =
+    "the target blends light of up to 65504 over light; what reads it takes infinity for 65504";
 
 pub(super) const CASES: &[DrawnCase] = &[
     DrawnCase::new(
         "drawn-lamp-on-the-surface",
         "a fragment at a lamp's place: a way of no length, interpolated",
         "UE-216276 (rsqrt of 0)",
-        || Solids::new(vec![wall()])?.lit(&[point(DVec3::new(0.0, 0.0, -4.0))]).staged(),
+        || {
+            Solids::new(vec![wall()])?
+                .lit(&[point(DVec3::new(0.0, 0.0, -4.0))])
+                .staged()
+        },
     ),
     DrawnCase::new(
         "drawn-lamps-of-most-power",
@@ -40,7 +45,10 @@ pub(super) const CASES: &[DrawnCase] = &[
         "Filament #2362",
         || {
             let bright = point(DVec3::new(0.0, 0.0, -3.0));
-            let bright = etalon_effects::lighting::PunctualLight { power: Vec3::splat(1e6), ..bright };
+            let bright = etalon_effects::lighting::PunctualLight {
+                power: Vec3::splat(1e6),
+                ..bright
+            };
             Solids::new(vec![wall()])?.lit(&[bright; 3]).staged()
         },
     ),
@@ -157,7 +165,11 @@ pub(super) const CASES: &[DrawnCase] = &[
             let lamps: Vec<_> = (0..1024)
                 .map(|k| etalon_effects::lighting::PunctualLight {
                     power: Vec3::splat(0.01),
-                    ..point(DVec3::new(f64::from(k % 32) * 0.1 - 1.6, f64::from(k / 32) * 0.1 - 1.6, -3.0))
+                    ..point(DVec3::new(
+                        f64::from(k % 32) * 0.1 - 1.6,
+                        f64::from(k / 32) * 0.1 - 1.6,
+                        -3.0,
+                    ))
                 })
                 .collect();
             Solids::new(vec![wall()])?.lit(&lamps).staged()
@@ -179,13 +191,23 @@ pub(super) const CASES: &[DrawnCase] = &[
         "glass-that-mirrors-all",
         "f0 of 1: nothing passes, whatever the opacity",
         "glTF 2.0, KHR_materials_ior (ior 0)",
-        || lit(vec![wall(), pane(0.2).made_of(|surface| surface.mirrored = 1.0)]),
+        || {
+            lit(vec![
+                wall(),
+                pane(0.2).made_of(|surface| surface.mirrored = 1.0),
+            ])
+        },
     ),
     DrawnCase::new(
         "glass-that-mirrors-nothing",
         "f0 of 0, an index of refraction of 1: a pane that is seen from the side alone",
         "Unity SRP #3518 (ior 1)",
-        || lit(vec![wall(), pane(0.0).made_of(|surface| surface.mirrored = 0.0)]),
+        || {
+            lit(vec![
+                wall(),
+                pane(0.0).made_of(|surface| surface.mirrored = 0.0),
+            ])
+        },
     ),
     DrawnCase::new(
         "glass-seen-edge-on",
@@ -222,7 +244,9 @@ pub(super) const CASES: &[DrawnCase] = &[
         || {
             let glowing = wall().made_of(|surface| surface.emission = Vec3::splat(65504.0));
             let bright = pane(0.5).made_of(|surface| surface.emission = Vec3::splat(65504.0));
-            Solids::new(vec![glowing, bright])?.under(65504.0, 65504.0).staged()
+            Solids::new(vec![glowing, bright])?
+                .under(65504.0, 65504.0)
+                .staged()
         },
     )
     .overflowing(OVER),
@@ -233,7 +257,9 @@ pub(super) const CASES: &[DrawnCase] = &[
         || {
             let mut solids = vec![wall()];
             solids.extend((0..16).map(|k| {
-                Solid::wall(3.5, 1.0).glass(0.1).placed(at(0.0, 0.0, 0.15 * f64::from(k)))
+                Solid::wall(3.5, 1.0)
+                    .glass(0.1)
+                    .placed(at(0.0, 0.0, 0.15 * f64::from(k)))
             }));
             lit(solids)
         },

@@ -205,9 +205,8 @@ pub(super) const CASES: &[DrawnCase] = &[
         "flattened to its own plane: the inverse of its transform does not exist",
         "glTF 2.0, §3.5.3 (scales of 0)",
         || {
-            let wall = Solid::wall(0.0, 1.5).placed(
-                at(0.0, 0.0, -4.0) * DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0)),
-            );
+            let wall = Solid::wall(0.0, 1.5)
+                .placed(at(0.0, 0.0, -4.0) * DMat4::from_scale(DVec3::new(1.0, 1.0, 0.0)));
             Solids::new(vec![wall])?.staged()
         },
     ),
@@ -227,8 +226,8 @@ pub(super) const CASES: &[DrawnCase] = &[
         "a scale of 0: every corner in one place, and a normal matrix of zeros",
         "glTF 2.0, §3.5.3 (scales of 0)",
         || {
-            let point = Solid::wall(0.0, 1.0)
-                .placed(at(1.0, 0.0, -4.0) * DMat4::from_scale(DVec3::ZERO));
+            let point =
+                Solid::wall(0.0, 1.0).placed(at(1.0, 0.0, -4.0) * DMat4::from_scale(DVec3::ZERO));
             Solids::new(vec![Solid::new(&[BESIDE]), point])?.staged()
         },
     ),
@@ -410,8 +409,9 @@ pub(super) const CASES: &[DrawnCase] = &[
         "what is held reaches through the near plane, moves, and is drawn first",
         "A. Courrèges, Doom (2016) Graphics Study",
         || {
-            let mut weapon = Solid::new(&[[[0.05, -0.2, 0.1], [0.6, -0.5, -1.0], [0.2, 0.3, -1.5]]])
-                .moving_from(at(0.02, 0.01, 0.0));
+            let mut weapon =
+                Solid::new(&[[[0.05, -0.2, 0.1], [0.6, -0.5, -1.0], [0.2, 0.3, -1.5]]])
+                    .moving_from(at(0.02, 0.01, 0.0));
             weapon.class = DrawClass::Weapon;
             Solids::new(vec![Solid::wall(4.0, 1.5), weapon])?.staged()
         },

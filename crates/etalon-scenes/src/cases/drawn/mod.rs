@@ -207,7 +207,9 @@ mod tests {
     #[test]
     fn every_stage_makes_a_graph_and_is_the_same_each_time() {
         for (effect, case) in drawn_cases() {
-            let stage = case.stage().unwrap_or_else(|error| panic!("{}: {error}", case.name));
+            let stage = case
+                .stage()
+                .unwrap_or_else(|error| panic!("{}: {error}", case.name));
             let graph = stage.graph(effect);
             assert!(graph.is_ok(), "{}: {:?}", case.name, graph.err());
             // NaN is not equal to itself, its letters are.

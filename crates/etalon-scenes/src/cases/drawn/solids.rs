@@ -303,7 +303,13 @@ impl Solids {
             lamps: Lamps::import(&mut graph, "lamps", self.lights.len() as u32)?,
             surroundings,
         };
-        let shaded = forward(&mut graph, &self.geometry_of(&opaque), None, &lighting, true)?;
+        let shaded = forward(
+            &mut graph,
+            &self.geometry_of(&opaque),
+            None,
+            &lighting,
+            true,
+        )?;
         let mut light = shaded.light;
         if !panes.is_empty() {
             let panes = self.geometry_of(&panes);

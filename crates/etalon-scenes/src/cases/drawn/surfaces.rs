@@ -137,7 +137,13 @@ impl Surfaces {
         if let Some(map) = &self.environment {
             surroundings.environment = Some(map.import(&mut graph)?);
         }
-        let light = lighting(&mut graph, &self.view, &surfaces, &self.lights, &surroundings)?;
+        let light = lighting(
+            &mut graph,
+            &self.view,
+            &surfaces,
+            &self.lights,
+            &surroundings,
+        )?;
         graph.output("light", light)?;
         Ok(graph)
     }

@@ -64,5 +64,7 @@ pub(in crate::functions) fn any(_: [f32; 4]) -> bool {
 
 /// All of them.
 pub(in crate::functions) fn functions() -> impl Iterator<Item = &'static Function> {
-    [numbers::FUNCTIONS, images::FUNCTIONS].into_iter().flatten()
+    [numbers::FUNCTIONS, images::FUNCTIONS]
+        .into_iter()
+        .flatten()
 }

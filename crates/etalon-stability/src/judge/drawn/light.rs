@@ -41,7 +41,10 @@ pub(super) fn wrong<'a>(surfaces: &Surfaces, stores: &'a [Store]) -> Option<Vec<
     let [colour, normal, specular, depth] = images.map(|image| Plane::of(image).ok());
     let (colour, normal, specular, depth) = (colour?, normal?, specular?, depth?);
     let emission = Plane::of(&surfaces.emission).ok()?;
-    let size = DVec2::new(stored.width().into(), (stored.texels().len() as u32 / stored.width()).into());
+    let size = DVec2::new(
+        stored.width().into(),
+        (stored.texels().len() as u32 / stored.width()).into(),
+    );
     let mut wrong = Vec::new();
     for (index, texel) in stored.texels().iter().enumerate() {
         let colour = *colour.texels().get(index)?;
@@ -98,7 +101,14 @@ fn spread(point: &Point, surfaces: &Surfaces) -> DVec3 {
     // A light's place counts as well: it is in view space in f32.
     let far = surfaces.lights.iter().map(|light| light.position.length());
     let far = far.fold(point.place.length(), f64::max).min(1e6) * OFF;
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z];
+    let axes = [
+        DVec3::X,
+        DVec3::Y,
+        DVec3::Z,
+        -DVec3::X,
+        -DVec3::Y,
+        -DVec3::Z,
+    ];
     let mut moved = DVec3::ZERO;
     for axis in axes {
         let near = Point {

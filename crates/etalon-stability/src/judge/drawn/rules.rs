@@ -63,7 +63,14 @@ impl Rules {
         let blended = f64::from(self.layers) * UNIT;
         if self.strict && (self.drawing == Drawing::Covering || bits && self.same_grid) {
             let blended = if bits { 0.0 } else { blended };
-            return [blended, if bits { 0.0 } else { f64::from(self.layers) * LEAST }];
+            return [
+                blended,
+                if bits {
+                    0.0
+                } else {
+                    f64::from(self.layers) * LEAST
+                },
+            ];
         }
         let passes = 2.0 * (number as f64 + 1.0) * UNIT + blended;
         let code = match format.encoding() {

@@ -127,8 +127,10 @@ impl<'a> Scene<'a> {
             if !(inside && seen && drawn.contains(&distance)) {
                 continue;
             }
-            let corners = solid.triangles[triangle].map(|corner| DVec3::from(corner.map(f64::from)));
-            let place = corners[0] + (corners[1] - corners[0]) * beta + (corners[2] - corners[0]) * gamma;
+            let corners =
+                solid.triangles[triangle].map(|corner| DVec3::from(corner.map(f64::from)));
+            let place =
+                corners[0] + (corners[1] - corners[0]) * beta + (corners[2] - corners[0]) * gamma;
             let met = Met {
                 solid: number,
                 triangle,
@@ -194,7 +196,11 @@ fn normal(to_view: DMat4, solid: &Solid, front: bool) -> DVec3 {
     let linear = DMat3::from_mat4(to_view);
     let (x, y, z) = (linear.x_axis, linear.y_axis, linear.z_axis);
     let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
-    let largest = cofactors.to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+    let largest = cofactors
+        .to_cols_array()
+        .into_iter()
+        .map(f64::abs)
+        .fold(0.0, f64::max);
     let size = if largest > 0.0 { largest } else { 1.0 };
     let sign = linear.determinant().signum();
     let turned = cofactors * DVec3::from(solid.normal.map(f64::from)) * (sign / size);
@@ -210,14 +216,17 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
     let scene = Scene::new(solids)?;
     let size = DVec2::new(solids.size.width().into(), solids.size.height().into());
     let store = |pass: &str, binding: &str| {
-        let store = stores.iter().find(|store| store.pass == pass && store.binding == binding)?;
+        let store = stores
+            .iter()
+            .find(|store| store.pass == pass && store.binding == binding)?;
         let image = store.image.as_ref()?;
         Some((store, image))
     };
     let images = [
         store("geometry/prepass", "depth").or_else(|| store("forward/opaque", "depth")),
         store("geometry/gbuffer", "normal").or_else(|| store("forward/opaque", "normal")),
-        of(stores, "geometry/camera velocity").and_then(|(store, _)| Some((store, store.image.as_ref()?))),
+        of(stores, "geometry/camera velocity")
+            .and_then(|(store, _)| Some((store, store.image.as_ref()?))),
     ];
     let mut wrong = Vec::new();
     for index in 0..solids.size.pixels() {
@@ -225,7 +234,9 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
         let (x, y) = ((index % width) as u32, (index / width) as u32);
         let centre = DVec2::new(x.into(), y.into()) + 0.5;
         let steps = [-BESIDE, 0.0, BESIDE];
-        let around = steps.iter().flat_map(|dy| steps.map(|dx| DVec2::new(dx, *dy)));
+        let around = steps
+            .iter()
+            .flat_map(|dy| steps.map(|dx| DVec2::new(dx, *dy)));
         let uvs = around.map(|off| (centre + off) / size);
         let met: Vec<_> = uvs
             .map(|uv| (uv, scene.nearest(ray(&solids.view.camera, uv))))
@@ -251,7 +262,9 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
         };
         let exact = channels(&shown[4]);
         for (which, image) in images.iter().enumerate() {
-            let Some((store, image)) = image else { continue };
+            let Some((store, image)) = image else {
+                continue;
+            };
             let Some(texel) = image.texel(x, y, 0, 0) else {
                 continue;
             };
@@ -259,7 +272,9 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
             let format = image.desc.format;
             for (channel, &exact) in exact[which].iter().enumerate() {
                 let others = shown.iter().map(|shown| channels(shown)[which][channel]);
-                let spread = others.map(|other| (other - exact).abs()).fold(0.0, f64::max);
+                let spread = others
+                    .map(|other| (other - exact).abs())
+                    .fold(0.0, f64::max);
                 // Interpolated over triangles that reach far, depth has some units of 1.
                 let step = match format {
                     Format::Depth32Float => OFF * exact.abs(),
@@ -271,7 +286,10 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
                     wrong.push(Wrong {
                         store,
                         index,
-                        what: format!("{:e} in place of {exact:e} in channel {channel}", stored[channel]),
+                        what: format!(
+                            "{:e} in place of {exact:e} in channel {channel}",
+                            stored[channel]
+                        ),
                     });
                 }
             }

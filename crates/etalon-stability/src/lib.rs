@@ -53,6 +53,7 @@ pub mod kernels;
 pub mod knobs;
 pub mod model;
 pub mod mutate;
+mod number;
 pub mod observe;
 pub mod per_driver;
 pub mod plant;

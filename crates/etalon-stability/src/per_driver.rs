@@ -16,7 +16,7 @@ use thiserror::Error;
 use crate::drivers::Driver;
 use crate::executors::Kind;
 use crate::model::{CaseReport, Finding, FindingKind, Report};
-use crate::run::{Options, Progress, RunError, run};
+use crate::run::{Options, Progress, REQUIRED, RunError, required, run};
 
 /// Variables that choose Vulkan drivers; the second is the older name of the first.
 const DRIVER_VARIABLES: [&str; 2] = ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"];
@@ -95,6 +95,14 @@ pub fn run_on(
             Err(reason) => report.failures.push(format!("{}: {reason}", driver.name)),
         }
     }
+    for kind in devices.iter().filter(|kind| required(kind.name())) {
+        let start = format!("{kind}/");
+        let mut executors = report.executors.iter();
+        if !executors.any(|executor| executor.name.starts_with(&start)) {
+            let none = format!("{kind} is required: no driver has a device for it");
+            report.failures.push(none);
+        }
+    }
     report.count();
     Ok(report)
 }
@@ -103,6 +111,8 @@ pub fn run_on(
 fn on_driver(child: &Child, driver: &Driver, executors: &str) -> Result<Report, String> {
     let mut command = Command::new(&child.program);
     command
+        // A manifest without a device is none that is missing.
+        .env_remove(REQUIRED)
         .args(&child.arguments)
         .args(["--executor", executors])
         .stdin(Stdio::null());
@@ -110,11 +120,11 @@ fn on_driver(child: &Child, driver: &Driver, executors: &str) -> Result<Report, 
         command.env(variable, &driver.manifest);
     }
     let output = command.output().map_err(|error| error.to_string())?;
-    serde_json::from_slice(&output.stdout).map_err(|_| {
+    serde_json::from_slice(&output.stdout).map_err(|error| {
         let said = String::from_utf8_lossy(&output.stderr);
         let said = said.trim();
         let start = said.floor_char_boundary(said.len().saturating_sub(LAST_WORDS));
-        format!("{}; it wrote: {}", output.status, &said[start..])
+        format!("{}, {error}; it wrote: {}", output.status, &said[start..])
     })
 }
 

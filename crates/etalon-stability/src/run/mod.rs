@@ -234,8 +234,11 @@ fn open(asked: &[Kind], report: &mut Report) -> Result<Vec<Executor>, RunError> 
     Ok(executors)
 }
 
+/// The variable that names backends which have to be there.
+pub(crate) const REQUIRED: &str = "ETALON_REQUIRE";
+
 /// Whether `ETALON_REQUIRE`, a list with commas, names a backend.
-fn required(backend: &str) -> bool {
-    std::env::var("ETALON_REQUIRE")
+pub(crate) fn required(backend: &str) -> bool {
+    std::env::var(REQUIRED)
         .is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
 }

@@ -239,6 +239,5 @@ pub(crate) const REQUIRED: &str = "ETALON_REQUIRE";
 
 /// Whether `ETALON_REQUIRE`, a list with commas, names a backend.
 pub(crate) fn required(backend: &str) -> bool {
-    std::env::var(REQUIRED)
-        .is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
+    std::env::var(REQUIRED).is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
 }

@@ -22,7 +22,7 @@ impl Given {
             Self::Camera => {
                 "import package::lib::camera::Camera;
 
-pub(in crate::functions) struct Params {
+struct Params {
     pub(in crate::functions) scale: vec2<f32>,
     centre: vec2<f32>,
     depth: vec2<f32>,

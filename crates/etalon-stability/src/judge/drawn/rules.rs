@@ -5,15 +5,17 @@
 //! layer. Drawn triangles add how they are rasterised, as in `test-backends`: on the
 //! interpreter's grid coverage and depth are the same bits, and what is interpolated is
 //! off by less than two units for each pass. On other grids corners move by up to 1/32 of
-//! a pixel: a pixel whose centre is that near to an edge may show something else.
+//! a pixel: a pixel whose centre is that near to an edge may show something else, and
+//! what is interpolated is what it is that far beside.
 
 use etalon_core::Format;
 use etalon_core::format::Encoding;
+use etalon_core::image::ImageData;
+use etalon_scenes::cases::drawn::Stage;
 
 use super::super::agreement::Difference;
 use crate::observe::Store;
 use crate::scene::{Drawing, Scene};
-use etalon_scenes::cases::drawn::Stage;
 
 /// The unit of the last place of a 16-bit float, relative to the value.
 const UNIT: f64 = 1.0 / 1024.0;
@@ -29,6 +31,46 @@ const MOST: f64 = 65_504.0;
 /// outlines as long as ten times the picture's, of which 1/16 of a pixel to either side
 /// is undecided.
 const UNDECIDED: f64 = 0.04;
+
+/// Pixels by which another grid moves what is interpolated between corners, each of which
+/// moves by 1/32.
+const MOVED: f64 = 1.0 / 16.0;
+
+/// The texels of a picture, to see how they change from one to the next.
+struct Neighbours {
+    width: usize,
+    texels: Vec<[f32; 4]>,
+}
+
+impl Neighbours {
+    fn of(image: &ImageData) -> Option<Self> {
+        Some(Self {
+            width: image.desc.extent.width.max(1) as usize,
+            texels: image.to_rgba_f32().ok()?,
+        })
+    }
+
+    /// The largest changes of a channel to a pixel beside and to one above or below,
+    /// together. To what is no number nothing changes.
+    fn slope(&self, index: usize, channel: usize) -> f64 {
+        let at = |index: usize| {
+            self.texels
+                .get(index)
+                .map(|texel| f64::from(texel[channel]))
+        };
+        let Some(own) = at(index) else { return 0.0 };
+        let change = |other: Option<usize>| {
+            let change = (other.and_then(at).unwrap_or(own) - own).abs();
+            if change.is_finite() { change } else { 0.0 }
+        };
+        let column = index % self.width;
+        let left = (column > 0).then(|| index - 1);
+        let right = (column + 1 < self.width).then_some(index + 1);
+        let above = index.checked_sub(self.width);
+        let below = Some(index + self.width);
+        change(left).max(change(right)) + change(above).max(change(below))
+    }
+}
 
 /// How a device draws beside the interpreter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +143,7 @@ impl Rules {
             let [relative, absolute] = self.allowed(format, number);
             let size = format.texel_bytes() as usize;
             let mut own: Option<Difference> = None;
+            let neighbours = Neighbours::of(a).filter(|_| outlines);
             let texels = a.bytes.chunks_exact(size).zip(b.bytes.chunks_exact(size));
             for (index, (a, b)) in texels.enumerate() {
                 if a == b {
@@ -108,12 +151,15 @@ impl Rules {
                 }
                 let (a, b) = (format.decode(a).to_f64(), format.decode(b).to_f64());
                 let beyond = (0..format.channels() as usize).find(|&channel| {
+                    let moved = neighbours
+                        .as_ref()
+                        .map_or(0.0, |all| all.slope(index, channel) * MOVED);
                     let [a, b] = [a, b].map(|texel| match format {
                         Format::Rgba16Float => texel[channel].clamp(-MOST, MOST),
                         _ => texel[channel],
                     });
                     // Written so that a NaN is beyond.
-                    let within = (a - b).abs() <= relative * a.abs() + absolute;
+                    let within = (a - b).abs() <= relative * a.abs() + absolute + moved;
                     !within
                 });
                 if let Some(channel) = beyond {
@@ -145,7 +191,6 @@ impl Rules {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use etalon_core::image::ImageData;
     use etalon_core::resource::TextureDesc;
 
     fn store(format: Format, values: &[f32]) -> Vec<Store> {
@@ -198,6 +243,25 @@ mod tests {
             ..rules
         };
         assert_eq!(found(other, depth, [&[0.5], &[next]]), None);
+    }
+
+    #[test]
+    fn what_changes_from_pixel_to_pixel_may_be_that_of_a_place_beside() {
+        let rules = Rules {
+            drawing: Drawing::Triangles,
+            layers: 0,
+            ..STRICT
+        };
+        // Two units are allowed of one pass, relative and absolute; a sixteenth of a
+        // change by 10 is 0.625.
+        let half = Format::Rgba16Float;
+        let slope: Vec<f32> = (0..20).map(|x| 10.0 * x as f32).collect();
+        let by = |off: f32| slope.iter().map(|x| x + off).collect::<Vec<_>>();
+        assert_eq!(found(rules, half, [&slope, &by(0.6)]), None);
+        assert!(found(rules, half, [&slope, &by(2.0)]).is_some());
+        let flat = vec![10.0; 20];
+        let off: Vec<f32> = flat.iter().map(|x| x + 0.6).collect();
+        assert_eq!(found(rules, half, [&flat, &off]), Some(20));
     }
 
     #[test]

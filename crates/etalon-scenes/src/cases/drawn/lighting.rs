@@ -517,7 +517,7 @@ pub(super) const CASES: &[DrawnCase] = &[
         "Filament #2362",
         || {
             let paint = |spot: &Spot| Texel {
-                specular: if spot.x % 2 == 0 {
+                specular: if spot.x.is_multiple_of(2) {
                     [1.0; 4]
                 } else {
                     [0.04, 0.04, 0.04, 0.0]

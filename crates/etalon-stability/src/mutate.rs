@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(users("lib/a", files), ["lib", "ssr"]);
         assert_eq!(users("ssr/march", files), ["ssr"]);
         let real = users("lib/camera", etalon_shaders::sources());
-        assert_eq!(real, ["lib", "ssr"]);
+        assert_eq!(real, ["geometry", "lib", "lighting", "ssr"]);
     }
 
     #[test]

@@ -4,11 +4,11 @@
 //! number, and of what is none, is held here to closed forms in `f64`, under strict
 //! arithmetic, on the interpreter and on devices.
 //!
-//! * [`table`]: which there are, what they promise and of what;
-//! * [`truth`]: their closed forms;
-//! * [`arguments`]: the numbers they are given;
-//! * [`execute`]: a kernel around a function, and what it stores;
-//! * [`judge`]: whether that is what was promised.
+//! * `table`: which there are, what they promise and of what;
+//! * `truth`: their closed forms;
+//! * `arguments`: the numbers they are given;
+//! * `execute`: a kernel around a function, and what it stores;
+//! * `judge`: whether that is what was promised.
 
 mod arguments;
 mod execute;

@@ -163,7 +163,7 @@ pub(super) const CASES: &[DrawnCase] = &[
         || Solids::new(vec![floor(1e4)])?.staged(),
     ),
     DrawnCase::new(
-        "world-10-km-from-the-origin",
+        "geometry-10-km-from-the-origin",
         "positions of 10 km in f32 have steps of a millimetre; only their difference from the eye's counts",
         "n8ao #54, on positions far from the origin",
         || {
@@ -173,7 +173,7 @@ pub(super) const CASES: &[DrawnCase] = &[
         },
     ),
     DrawnCase::new(
-        "world-a-million-km-from-the-origin",
+        "geometry-a-million-km-from-the-origin",
         "positions of 1e9: in f32 nothing of a scene of metres would be left",
         "C. Thorne, Using a Floating Origin to Improve Fidelity, 2005",
         || {

@@ -23,7 +23,7 @@ impl Given {
                 "import package::lib::camera::Camera;
 
 struct Params {
-    pub(in crate::functions) scale: vec2<f32>,
+    scale: vec2<f32>,
     centre: vec2<f32>,
     depth: vec2<f32>,
     range: vec2<f32>,

@@ -1,10 +1,10 @@
 //! Is what is drawn, and its light, as it should be?
 //!
 //! * [`Rules`]: is a device's picture the interpreter's, as far as rasterisers are free?
-//! * [`solids`]: does a pixel show the triangle that a ray through it meets first, at its
+//! * `solids`: does a pixel show the triangle that a ray through it meets first, at its
 //!   depth, with its normal, moving as it does?
-//! * [`light`]: does a surface send what the reflection model says?
-//! * [`map`]: does light that is the same from everywhere stay as it is?
+//! * `light`: does a surface send what the reflection model says?
+//! * `map`: does light that is the same from everywhere stay as it is?
 
 mod light;
 mod map;

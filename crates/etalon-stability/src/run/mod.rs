@@ -7,7 +7,7 @@ use etalon_core::backend::BackendError;
 use etalon_scenes::cases::case;
 use thiserror::Error;
 
-use crate::exceptions::{BadLine, exceptions};
+use crate::exceptions::{BadLine, Exception, exceptions};
 use crate::executors::{Executor, Kind};
 use crate::functions;
 use crate::knobs;
@@ -162,6 +162,7 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
             .refusals
             .retain(|refusal| options.asks_for(&refusal.effect));
     }
+    report.notes.extend(not_needed(&exceptions, &report));
     let (found, unused) = watch.finish();
     for found in found {
         report.sites.push(found.finding);
@@ -174,6 +175,30 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     }
     report.count();
     Ok(report)
+}
+
+/// Exceptions about a device that was there and a case that was run, for which nothing is
+/// excused.
+fn not_needed(exceptions: &[Exception], report: &Report) -> Vec<String> {
+    let devices = |one: &Exception| {
+        let mut executors = report.executors.iter();
+        executors.any(|executor| executor.device.contains(&one.device))
+    };
+    let idle = |one: &Exception| {
+        let mut cases = report.cases.iter();
+        cases.any(|case| {
+            case.name == one.case && case.effect == one.effect && case.excused.is_empty()
+        })
+    };
+    let found = exceptions.iter().filter(|one| devices(one) && idle(one));
+    found
+        .map(|one| {
+            format!(
+                "exceptions.txt: {} on {} by {} is not needed",
+                one.effect, one.case, one.device
+            )
+        })
+        .collect()
 }
 
 /// The cases asked for with their effects.

@@ -291,6 +291,7 @@ pub(super) fn wrong<'a>(solids: &Solids, stores: &'a [Store]) -> Option<Vec<Wron
                             stored[channel]
                         ),
                     });
+                    break;
                 }
             }
         }

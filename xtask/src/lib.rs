@@ -3,7 +3,6 @@
 #![forbid(unsafe_code)]
 
 pub mod compare;
-pub mod drivers;
 pub mod execute;
 pub mod instructions;
 pub mod measure;
@@ -19,6 +18,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+pub use etalon_stability::drivers;
 
 /// Tasks of the Etalon project.
 #[derive(Debug, Parser)]

@@ -77,7 +77,7 @@ pub fn lamp_bytes(view: &View, lights: &[PunctualLight]) -> Result<Vec<u8>, Sett
             lamp.place.extend(lamp.reach),
             lamp.direction.extend(directional),
             lamp.power.extend(lamp.cone_scale),
-            glam::Vec4::new(lamp.cone_offset, 0.0, 0.0, 0.0),
+            glam::Vec4::new(lamp.cone_edge, 0.0, 0.0, 0.0),
         ] {
             bytes.extend(row.to_array().into_iter().flat_map(f32::to_le_bytes));
         }

@@ -13,8 +13,9 @@
 //! are not rounded to any format.
 //!
 //! [`ssr`](crate::ssr::truth), [`bloom`](crate::bloom::truth),
-//! [`exposure`](crate::exposure::truth), [`composite`](crate::composite::truth) and
-//! [`environment`](crate::environment::truth) each have one.
+//! [`exposure`](crate::exposure::truth), [`composite`](crate::composite::truth),
+//! [`environment`](crate::environment::truth) and
+//! [`lighting`](crate::lighting::truth) each have one.
 
 use etalon_core::Format;
 use etalon_core::image::{ImageData, ImageError};

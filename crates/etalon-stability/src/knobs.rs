@@ -10,7 +10,8 @@ use etalon_effects::{ChainSettings, EffectEntry, EffectError, chain, effects};
 use etalon_scenes::cases::{Case, Step};
 
 use crate::model::Refusal;
-use crate::subject::Subject;
+use crate::scene::Effect;
+use crate::subject::{Frames, Subject};
 
 /// The case on whose frames knobs are turned: one texel in sixteen is something
 /// special, so that an end of a range meets every kind of input.
@@ -96,11 +97,12 @@ pub fn subjects(frames: &'static Case) -> Vec<Subject> {
                         knob.name, knob.domain, knob.description
                     ),
                     source: format!("the settings of etalon_effects::{}", effect.name),
-                    effects: vec![*effect],
+                    effects: vec![Effect::OfImages(*effect)],
                     knobs,
                     expected: &[],
                     recovery: None,
-                    frames,
+                    overflows: None,
+                    frames: Frames::Images(frames),
                 });
             }
         }
@@ -120,7 +122,7 @@ pub fn extremes(frames: &'static Case) -> Subject {
                  make light of 10²³ of that of the sun, whose square f32 cannot hold"
                 .to_owned(),
         source: "the settings of etalon_effects::exposure and etalon_effects::composite".to_owned(),
-        effects: vec![EffectEntry::fixed(
+        effects: vec![Effect::OfImages(EffectEntry::fixed(
             "chain",
             "The chain at its brightest",
             |graph, inputs| {
@@ -141,11 +143,12 @@ pub fn extremes(frames: &'static Case) -> Subject {
                 };
                 Ok(chain(graph, inputs, &settings)?.picture)
             },
-        )],
+        ))],
         knobs: Vec::new(),
         expected: &[],
         recovery: None,
-        frames,
+        overflows: None,
+        frames: Frames::Images(frames),
     }
 }
 

@@ -11,14 +11,18 @@
 //! * and at which operation of which kernel did it lose its digits, or decide what
 //!   `f64` would not?
 //!
-//! * [`subject`]: what is run: the corpus, and [`knobs`] at and beyond their ends;
+//! * [`subject`], [`scene`]: what is run: the corpus, and [`knobs`] at and beyond their
+//!   ends;
 //! * [`functions`]: the kernels' library by itself;
 //! * [`executors`], [`observe`]: who runs it, and what its passes wrote;
 //! * [`kernels`]: kernels of a folder, to try a formula;
 //! * [`judge`]: what is asked of that, a module for each question;
+//! * [`exceptions`]: what of that drivers are known for;
 //! * [`sanitise`]: what is found inside of kernels, and what comments in them allow;
 //! * [`mutate`]: whether anything is found where a kernel's guard is missing;
 //! * [`run`](mod@run): all of it, into a [`model::Report`];
+//! * [`per_driver`]: the same on every Vulkan driver that [`drivers`] finds, a process
+//!   for each;
 //! * [`table`](mod@table), [`report`]: the findings for a terminal and as a page.
 //!
 //! ```
@@ -40,6 +44,8 @@
 
 #![forbid(unsafe_code)]
 
+pub mod drivers;
+pub mod exceptions;
 pub mod executors;
 pub mod functions;
 pub mod judge;
@@ -47,11 +53,14 @@ pub mod kernels;
 pub mod knobs;
 pub mod model;
 pub mod mutate;
+mod number;
 pub mod observe;
+pub mod per_driver;
 pub mod plant;
 pub mod report;
 pub mod run;
 pub mod sanitise;
+pub mod scene;
 pub mod subject;
 pub mod table;
 mod text;

@@ -2,14 +2,16 @@
 
 #![forbid(unsafe_code)]
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use etalon_stability::executors::Kind;
+use etalon_stability::per_driver::{self, Child};
 use etalon_stability::plant::Plant;
 use etalon_stability::run::{FOLLOWED, Options, Progress, run};
-use etalon_stability::{kernels, mutate, report, table};
+use etalon_stability::{drivers, kernels, mutate, report, table};
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Runs every effect on a corpus of hard cases, on every backend: are all results
@@ -32,6 +34,10 @@ struct Arguments {
         default_value = "cpu,cpu-f64,cpu-shadow,sanitiser,perturbed,wgpu,ash"
     )]
     executor: Vec<Kind>,
+    /// Vulkan drivers to run wgpu and Vulkan on, each in a process of its own: `all`, or
+    /// names like `lavapipe,swiftshader`. Without it the first device of the first.
+    #[arg(long, value_delimiter = ',', value_name = "all|NAMES")]
+    drivers: Vec<String>,
     /// Most texels of a frame; larger cases are left out.
     #[arg(long)]
     largest: Option<usize>,
@@ -56,6 +62,9 @@ struct Arguments {
     /// Plant a fault to be found, as `wgpu:nan`, `ash:bit` or `cpu-shadow:error`.
     #[arg(long, hide = true)]
     plant: Option<Plant>,
+    /// Write the report to standard output as JSON, and nothing else.
+    #[arg(long, hide = true)]
+    data: bool,
 }
 
 /// Progress as a bar with an estimate.
@@ -73,6 +82,29 @@ impl Progress for Shown {
 }
 
 impl Arguments {
+    /// This program once more, with the same cases, for a driver.
+    fn child(&self) -> Result<Child, String> {
+        let program = std::env::current_exe()
+            .map_err(|error| format!("this program cannot find itself: {error}"))?;
+        let mut arguments: Vec<OsString> = vec!["--data".into()];
+        for (option, values) in [("--effect", &self.effect), ("--case", &self.case)] {
+            for value in values {
+                arguments.extend([option.into(), value.into()]);
+            }
+        }
+        if let Some(largest) = self.largest {
+            arguments.extend(["--largest".into(), largest.to_string().into()]);
+        }
+        arguments.extend(["--followed".into(), self.followed.to_string().into()]);
+        if let Some(kernels) = &self.kernels {
+            arguments.extend(["--kernels".into(), kernels.into()]);
+        }
+        if let Some(plant) = &self.plant {
+            arguments.extend(["--plant".into(), plant.to_string().into()]);
+        }
+        Ok(Child { program, arguments })
+    }
+
     fn run(self) -> Result<bool, String> {
         if self.mutate {
             let shown = ProgressBar::no_length();
@@ -89,6 +121,7 @@ impl Arguments {
             Some(folder) => kernels::of_folder(folder).map_err(|error| error.to_string())?,
             None => Vec::new(),
         };
+        let child = self.child()?;
         let options = Options {
             cases: self.case,
             effects: self.effect,
@@ -102,9 +135,23 @@ impl Arguments {
         let style = ProgressStyle::with_template("{wide_bar} {pos}/{len}, {eta} left  {msg}")
             .unwrap_or_else(|_| ProgressStyle::default_bar());
         let mut shown = Shown(ProgressBar::new(0).with_style(style));
-        let found = run(&options, &mut shown);
+        let found = if self.drivers.is_empty() {
+            run(&options, &mut shown)
+        } else {
+            let found = drivers::find(&drivers::Environment::of_process());
+            let chosen = per_driver::chosen(found.drivers, &self.drivers);
+            let chosen = chosen.map_err(|error| error.to_string())?;
+            per_driver::run_on(&options, &child, &chosen, &mut shown)
+        };
         shown.0.finish_and_clear();
         let found = found.map_err(|error| error.to_string())?;
+        if self.data {
+            print!(
+                "{}",
+                report::json(&found).map_err(|error| error.to_string())?
+            );
+            return Ok(found.is_sound());
+        }
         print!("{}", table::text(&found));
         if let Some(path) = &self.json {
             let text = report::json(&found).map_err(|error| error.to_string())?;

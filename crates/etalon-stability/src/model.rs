@@ -1,6 +1,6 @@
 //! What was found, as data.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,8 @@ pub struct Report {
     pub refusals: Vec<Refusal>,
     /// Executors that were not there, and why.
     pub notes: Vec<String>,
+    /// Processes that gave no report, and how they ended.
+    pub failures: Vec<String>,
 }
 
 impl Report {
@@ -52,7 +54,22 @@ impl Report {
     /// Whether nothing was found that should not be.
     #[must_use]
     pub fn is_sound(&self) -> bool {
-        self.findings().next().is_none() && self.accepted().next().is_none()
+        self.findings().next().is_none()
+            && self.accepted().next().is_none()
+            && self.failures.is_empty()
+    }
+
+    /// Counts what there is into [`Report::totals`].
+    pub fn count(&mut self) {
+        let names: BTreeSet<&str> = self.cases.iter().map(|case| case.name.as_str()).collect();
+        let results = self.cases.iter().flat_map(|case| &case.results);
+        self.totals = Totals {
+            cases: names.len(),
+            pairs: self.cases.len(),
+            executions: results.map(|result| result.executions).sum(),
+            refusals: self.refusals.len(),
+            findings: self.findings().count() + self.accepted().count() + self.failures.len(),
+        };
     }
 }
 
@@ -67,7 +84,7 @@ pub struct Totals {
     pub executions: u64,
     /// Values tried that are not allowed.
     pub refusals: usize,
-    /// Findings, and values that were not refused.
+    /// Findings, values that were not refused, and processes without a report.
     pub findings: usize,
 }
 
@@ -109,6 +126,8 @@ pub struct CaseReport {
     pub results: Vec<ExecutorResult>,
     /// What should not be.
     pub findings: Vec<Finding>,
+    /// What should not be and a driver is known for.
+    pub excused: Vec<Excused>,
 }
 
 impl CaseReport {
@@ -225,6 +244,15 @@ pub struct Finding {
     pub executor: String,
     /// What and where.
     pub text: String,
+}
+
+/// A finding that an exception is about.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Excused {
+    /// What was found.
+    pub finding: Finding,
+    /// Why the driver is known for it.
+    pub reason: String,
 }
 
 /// What was said to a value that is not allowed.

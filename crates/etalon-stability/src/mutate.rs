@@ -12,13 +12,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use etalon_effects::effect;
 use serde::{Deserialize, Serialize};
 
 use crate::executors::Kind;
 use crate::functions::LIBRARY;
 use crate::model::Report;
 use crate::run::{Options, RunError, run};
+use crate::scene::Effect;
 
 /// What begins such a comment.
 pub(crate) const MARK: &str = "// unguarded: ";
@@ -186,7 +186,7 @@ fn users<'a>(path: &str, files: impl IntoIterator<Item = (&'a str, &'a str)>) ->
         }
     }
     let folders = found.iter().filter_map(|path| path.split('/').next());
-    let known = |folder: &&str| *folder == LIBRARY || effect(folder).is_some();
+    let known = |folder: &&str| *folder == LIBRARY || Effect::names().any(|name| name == *folder);
     let folders: BTreeSet<&str> = folders.filter(known).collect();
     folders.into_iter().map(str::to_owned).collect()
 }
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(users("lib/a", files), ["lib", "ssr"]);
         assert_eq!(users("ssr/march", files), ["ssr"]);
         let real = users("lib/camera", etalon_shaders::sources());
-        assert_eq!(real, ["lib", "ssr"]);
+        assert_eq!(real, ["geometry", "lib", "lighting", "ssr"]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Faults planted into results, to see that they are found.
 
+use std::fmt;
 use std::str::FromStr;
 
 use etalon_core::format::SampleKind;
@@ -50,6 +51,17 @@ impl FromStr for Plant {
                 }
             },
         })
+    }
+}
+
+impl fmt::Display for Plant {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fault = match self.fault {
+            Fault::Nan => "nan",
+            Fault::Bit => "bit",
+            Fault::Error => "error",
+        };
+        write!(f, "{}:{fault}", self.executor)
     }
 }
 

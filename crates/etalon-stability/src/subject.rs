@@ -2,11 +2,13 @@
 
 use etalon_core::graph::Graph;
 use etalon_effects::knob::KnobValue;
-use etalon_effects::{EffectEntry, EffectError, effects};
-use etalon_scenes::cases::{Case, CaseError, Expected, Recovery, Step, case, cases};
+use etalon_effects::{EffectError, effects};
+use etalon_scenes::cases::drawn::{DrawnCase, DrawnEffect, drawn_cases};
+use etalon_scenes::cases::{Case, CaseError, Expected, Recovery, case, cases};
 use thiserror::Error;
 
 use crate::knobs;
+use crate::scene::{Effect, Scene};
 
 /// A case, by whatever its frames come from.
 #[derive(Clone, Debug)]
@@ -20,15 +22,26 @@ pub struct Subject {
     /// Where that is known from.
     pub source: String,
     /// The effects that are run on it.
-    pub effects: Vec<EffectEntry>,
+    pub effects: Vec<Effect>,
     /// Knobs that are set.
     pub knobs: Vec<(&'static str, KnobValue)>,
     /// Larger rounding errors, with their reasons.
     pub expected: &'static [Expected],
     /// When the results have to be what they are without a fault.
     pub recovery: Option<Recovery>,
+    /// Why sums in a target may be infinite, if they may.
+    pub overflows: Option<&'static str>,
     /// The case whose frames these are.
-    pub frames: &'static Case,
+    pub frames: Frames,
+}
+
+/// Where frames come from.
+#[derive(Clone, Copy, Debug)]
+pub enum Frames {
+    /// Images of scenes.
+    Images(&'static Case),
+    /// What is drawn and lit.
+    Stage(&'static DrawnCase),
 }
 
 /// Why a subject has no frames.
@@ -41,7 +54,7 @@ pub enum SubjectError {
         /// The case.
         name: String,
         /// Why not.
-        source: CaseError,
+        source: Box<CaseError>,
     },
     /// The corpus lacks the frames that knobs are turned on.
     #[error("the corpus has no case `{0}`")]
@@ -49,7 +62,7 @@ pub enum SubjectError {
 }
 
 impl Subject {
-    fn of(family: &'static str, case: &'static Case) -> Self {
+    fn of_images(family: &'static str, case: &'static Case) -> Self {
         Self {
             name: case.name.to_owned(),
             family,
@@ -59,11 +72,28 @@ impl Subject {
                 .iter()
                 .filter(|effect| case.concerns(effect.name))
                 .copied()
+                .map(Effect::OfImages)
                 .collect(),
             knobs: case.knobs.to_vec(),
             expected: case.expected,
             recovery: case.recovery,
-            frames: case,
+            overflows: None,
+            frames: Frames::Images(case),
+        }
+    }
+
+    fn of_stage(effect: DrawnEffect, case: &'static DrawnCase) -> Self {
+        Self {
+            name: case.name.to_owned(),
+            family: effect.name(),
+            reason: case.reason.to_owned(),
+            source: case.source.to_owned(),
+            effects: vec![Effect::Drawn(effect)],
+            knobs: Vec::new(),
+            expected: &[],
+            recovery: None,
+            overflows: case.overflows,
+            frames: Frames::Stage(case),
         }
     }
 
@@ -71,35 +101,50 @@ impl Subject {
     ///
     /// # Errors
     /// If memory runs out.
-    pub fn steps(&self) -> Result<Vec<Step>, SubjectError> {
-        self.frames.steps().map_err(|source| SubjectError::Case {
+    pub fn scenes(&self) -> Result<Vec<Scene>, SubjectError> {
+        let scenes = match self.frames {
+            Frames::Images(case) => case.steps().map(|steps| {
+                let steps = steps.into_iter().map(Box::new);
+                steps.map(Scene::Images).collect()
+            }),
+            Frames::Stage(case) => case.stage().map(|stage| vec![Scene::Stage(stage)]),
+        };
+        scenes.map_err(|source| SubjectError::Case {
             name: self.name.clone(),
-            source,
+            source: Box::new(source),
         })
     }
 
-    /// The graph of an effect on one of its frames, its result as the output
-    /// `result`.
+    /// The graph of an effect on one of its frames; the result of one of images is the
+    /// output `result`.
     ///
     /// # Errors
     /// If the effect refuses the frame or a knob's value.
-    pub fn graph(&self, effect: &EffectEntry, step: &Step) -> Result<Graph, EffectError> {
-        let mut graph = Graph::new();
-        let inputs = step.import(&mut graph)?;
-        let result = effect.build_with(&mut graph, &inputs, &self.knobs)?;
-        graph.output("result", result)?;
-        Ok(graph)
+    pub fn graph(&self, effect: &Effect, scene: &Scene) -> Result<Graph, EffectError> {
+        match (effect, scene) {
+            (Effect::OfImages(entry), Scene::Images(step)) => {
+                let mut graph = Graph::new();
+                let inputs = step.import(&mut graph)?;
+                let result = entry.build_with(&mut graph, &inputs, &self.knobs)?;
+                graph.output("result", result)?;
+                Ok(graph)
+            }
+            (Effect::Drawn(effect), Scene::Stage(stage)) => stage.graph(*effect),
+            // Cases name the effects that take what they make.
+            _ => Ok(Graph::new()),
+        }
     }
 }
 
-/// Every case: those of the corpus, then every knob at its ends.
+/// Every case: those of images, those of what is drawn, then every knob at its ends.
 ///
 /// # Errors
 /// If the corpus lacks the frames that knobs are turned on.
 pub fn subjects() -> Result<Vec<Subject>, SubjectError> {
     let mut found: Vec<Subject> = cases()
-        .map(|(family, case)| Subject::of(family.name(), case))
+        .map(|(family, case)| Subject::of_images(family.name(), case))
         .collect();
+    found.extend(drawn_cases().map(|(effect, case)| Subject::of_stage(effect, case)));
     let frames = case(knobs::FRAMES).ok_or(SubjectError::Missing(knobs::FRAMES))?;
     found.extend(knobs::subjects(frames));
     found.push(knobs::extremes(frames));

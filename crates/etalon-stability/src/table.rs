@@ -26,6 +26,9 @@ pub fn text(report: &Report) -> String {
     for note in &report.notes {
         let _ = writeln!(out, "{note}");
     }
+    for failure in &report.failures {
+        let _ = writeln!(out, "FAILED {failure}");
+    }
     families(&mut out, report);
     rows(&mut out, report);
     sites(&mut out, report);
@@ -38,6 +41,22 @@ pub fn text(report: &Report) -> String {
             out,
             "  {} on {}, {}: {}",
             case.effect, case.name, finding.executor, finding.text
+        );
+    }
+    let excused = || {
+        report
+            .cases
+            .iter()
+            .flat_map(|case| case.excused.iter().map(move |one| (case, one)))
+    };
+    if excused().next().is_some() {
+        let _ = writeln!(out, "\nKnown of drivers");
+    }
+    for (case, one) in excused() {
+        let _ = writeln!(
+            out,
+            "  {} on {}, {}: {} ({})",
+            case.effect, case.name, one.finding.executor, one.reason, one.finding.text
         );
     }
     for refusal in report.accepted() {

@@ -32,7 +32,8 @@ pub enum LightKind {
 pub struct PunctualLight {
     /// Of what kind it is.
     pub kind: LightKind,
-    /// Where it is; of no concern to directional ones.
+    /// Where it is; of no concern to directional ones. What is nearer than a millimetre
+    /// is lit as from a millimetre.
     pub position: DVec3,
     /// In which direction it shines: any length but zero; of no concern to points.
     pub direction: DVec3,
@@ -51,7 +52,7 @@ pub(crate) struct Packed {
     pub(crate) power: Vec3,
     pub(crate) reach: f32,
     pub(crate) cone_scale: f32,
-    pub(crate) cone_offset: f32,
+    pub(crate) cone_edge: f32,
 }
 
 impl PunctualLight {
@@ -82,13 +83,13 @@ impl PunctualLight {
 
     /// In the space of a view.
     pub(crate) fn packed(&self, view: &View) -> Packed {
-        // An intensity of 1 everywhere, or a step in cosines from outer to inner.
-        let (scale, offset) = match self.kind {
-            LightKind::Directional | LightKind::Point => (0.0, 1.0),
+        // 1 - cos a is 2 sin² (a / 2), at most 2: an edge of 3 has all directions within.
+        let (scale, edge) = match self.kind {
+            LightKind::Directional | LightKind::Point => (1.0, 3.0),
             LightKind::Spot { inner, outer } => {
-                let (inner, outer) = (f64::from(inner).cos(), f64::from(outer).cos());
-                let scale = 1.0 / (inner - outer);
-                (scale as f32, (-outer * scale) as f32)
+                let versine = |angle: f32| 2.0 * (0.5 * f64::from(angle)).sin().powi(2);
+                let edge = versine(outer);
+                ((1.0 / (edge - versine(inner))) as f32, edge as f32)
             }
         };
         let direction = view
@@ -102,7 +103,7 @@ impl PunctualLight {
             power: self.power,
             reach: self.reach.unwrap_or(0.0),
             cone_scale: scale,
-            cone_offset: offset,
+            cone_edge: edge,
         }
     }
 
@@ -133,6 +134,6 @@ impl PunctualLight {
             .set("power", light.power)
             .set("reach", light.reach)
             .set("cone_scale", light.cone_scale)
-            .set("cone_offset", light.cone_offset)
+            .set("cone_edge", light.cone_edge)
     }
 }

@@ -9,6 +9,7 @@
 
 pub(crate) mod demand;
 mod light;
+pub mod truth;
 
 use etalon_core::Format;
 use etalon_core::graph::{ClearValue, Draw, Graph, Load, Texture};

@@ -186,8 +186,10 @@ fn lamps_are_packed_in_the_space_of_the_view() {
     // The view is five behind the origin.
     assert_eq!(numbers[..4], [1.0, 2.0, -2.0, 8.0]);
     assert_eq!(numbers[4..8], [0.0, -1.0, 0.0, 0.0]);
-    assert_eq!(numbers[8..12], [1.0, 1.0, 1.0, 0.0]);
-    assert_eq!(numbers[12], 1.0);
+    // A point's cone has all directions within: 1 - cosine is at most 2.
+    assert_eq!(numbers[8..11], [1.0; 3]);
+    let [scale, edge] = [numbers[11], numbers[12]];
+    assert!((edge - 2.0) * scale >= 1.0, "{edge} · {scale}");
     assert_eq!(numbers[20..24], [0.0, -1.0, 0.0, 1.0]);
     assert_eq!(numbers[19], 0.0);
     assert_eq!(numbers.len(), 32);

@@ -22,6 +22,7 @@
 
 mod bits;
 mod depth;
+pub mod drawn;
 mod light;
 mod materials;
 mod normals;
@@ -36,7 +37,7 @@ use std::fmt;
 use etalon_core::graph::{Graph, GraphError};
 use etalon_core::image::ImageError;
 use etalon_effects::knob::KnobValue;
-use etalon_effects::{CameraParams, SceneInputs};
+use etalon_effects::{CameraParams, EffectError, SceneInputs};
 use thiserror::Error;
 
 use crate::camera::CameraError;
@@ -284,6 +285,9 @@ pub enum CaseError {
     /// Its camera is not possible.
     #[error(transparent)]
     Camera(#[from] CameraError),
+    /// An effect refuses what it gives.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
     /// Its scene is not possible.
     #[error(transparent)]
     World(#[from] WorldError),

@@ -19,8 +19,10 @@ pub struct Difference {
     /// possible for a number against none.
     pub ulps: u64,
     /// What the interpreter has there.
+    #[serde(with = "crate::number")]
     pub reference: f64,
     /// What the device has there.
+    #[serde(with = "crate::number")]
     pub subject: f64,
 }
 

@@ -1,5 +1,6 @@
 //! Is everything a number?
 
+use etalon_core::Format;
 use serde::{Deserialize, Serialize};
 
 use crate::observe::{Place, Store};
@@ -14,7 +15,9 @@ pub struct NonFinite {
 }
 
 /// Looks through what a frame's passes wrote, and adds what is no number to `found`.
-pub fn look(frame: usize, stores: &[Store], found: &mut Option<NonFinite>) {
+/// `overflows` if light in 16-bit floats may be infinite: a target that adds layers up
+/// asks nobody.
+pub fn look(frame: usize, stores: &[Store], overflows: bool, found: &mut Option<NonFinite>) {
     for store in stores {
         let mut report = |index: usize, channel: usize| {
             found
@@ -30,6 +33,10 @@ pub fn look(frame: usize, stores: &[Store], found: &mut Option<NonFinite>) {
             for (index, texel) in texels.enumerate() {
                 let codes = format.codes(texel);
                 for channel in 0..format.channels() as usize {
+                    let infinite = || format.decode(texel).to_f64()[channel] == f64::INFINITY;
+                    if overflows && format == Format::Rgba16Float && infinite() {
+                        continue;
+                    }
                     if format.is_non_finite(channel, codes.channels[channel]) {
                         report(index, channel);
                     }
@@ -38,7 +45,9 @@ pub fn look(frame: usize, stores: &[Store], found: &mut Option<NonFinite>) {
             // Formats that clamp would hide it.
             for (index, texel) in store.wide.iter().flatten().enumerate() {
                 for (channel, value) in texel.iter().enumerate() {
-                    if !value.is_finite() && channel < format.channels() as usize {
+                    if !(value.is_finite() || overflows && *value == f64::INFINITY)
+                        && channel < format.channels() as usize
+                    {
                         report(index, channel);
                     }
                 }

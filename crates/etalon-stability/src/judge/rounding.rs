@@ -33,16 +33,21 @@ pub const BOUND: f64 = 1.0 / 2048.0;
 pub struct Rounding {
     /// The largest error, relative, of those that are closest to what is allowed
     /// there.
+    #[serde(with = "crate::number")]
     pub max: f64,
     /// What is allowed there.
+    #[serde(with = "crate::number")]
     pub allowed: f64,
     /// Where that is.
     pub at: Place,
     /// What was stored there.
+    #[serde(with = "crate::number")]
     pub stored: f64,
     /// What the shadow has there.
+    #[serde(with = "crate::number")]
     pub exact: f64,
     /// The error that 99.9 % of the texels of all passes do not exceed.
+    #[serde(with = "crate::number")]
     pub p999: f64,
     /// Texels with an error that is not allowed.
     pub beyond: u64,

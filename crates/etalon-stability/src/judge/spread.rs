@@ -36,6 +36,7 @@ const DECISION: f64 = 1.0 / 64.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Width {
     /// The largest move of a texel, relative to 1 or the number if that is more.
+    #[serde(with = "crate::number")]
     pub largest: f64,
     /// Texels of all passes.
     pub texels: u64,
@@ -53,10 +54,13 @@ pub struct Outside {
     /// The first.
     pub first: Place,
     /// What the device has there.
+    #[serde(with = "crate::number")]
     pub subject: f64,
     /// What the interpreter has.
+    #[serde(with = "crate::number")]
     pub centre: f64,
     /// How far from it is allowed.
+    #[serde(with = "crate::number")]
     pub allowed: f64,
 }
 

@@ -7,7 +7,8 @@
 //!   exact search finds, and may not make one up;
 //! * the luminance adapted to and its factor, frame after frame, where every texel is
 //!   measured ([`exposure`]);
-//! * the final picture ([`composite`]).
+//! * the final picture ([`composite`]);
+//! * what is drawn, and its light ([`drawn`]).
 //!
 //! Of the first it is known how far `f32` may be off. Of the others the difference is
 //! rounding: allowed is [`BOUND`] as for [rounding](super::rounding), beside what storing
@@ -22,11 +23,14 @@ use etalon_effects::ssr::Ssr;
 use etalon_effects::ssr::truth::claim::Claims;
 use etalon_effects::truth::Plane;
 use etalon_scenes::cases::Step;
+use etalon_scenes::cases::drawn::DrawnEffect;
 use serde::{Deserialize, Serialize};
 
+use super::drawn;
 use super::rounding::BOUND;
 use super::scale::half_step;
 use crate::observe::{Place, Store};
+use crate::scene::Scene;
 
 /// Texels that are not what they should be.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -48,6 +52,8 @@ enum Truth {
         held: Option<f64>,
     },
     Composite(Composite),
+    /// What is drawn and lit: its stage says what that is.
+    Stage,
 }
 
 /// Holds a case's frames to an effect's truth, one after the other.
@@ -82,6 +88,7 @@ impl Judge {
                 held: None,
             },
             "composite" => Truth::Composite(settings(knobs)?),
+            _ if DrawnEffect::named(effect).is_some() => Truth::Stage,
             _ => return None,
         };
         Some(Self {
@@ -93,13 +100,17 @@ impl Judge {
 
     /// Looks at what a frame's passes stored. Inputs that are no images of numbers, and
     /// images that memory does not hold twice, are left out.
-    pub fn look(&mut self, frame: usize, step: &Step, stores: &[Store]) {
-        let wrong = match &mut self.truth {
-            Truth::Ssr(settings) => reflections(settings, step, stores),
-            Truth::Exposure { settings, held } => {
+    pub fn look(&mut self, frame: usize, scene: &Scene, stores: &[Store]) {
+        let wrong = match (&mut self.truth, scene) {
+            (Truth::Ssr(settings), Scene::Images(step)) => reflections(settings, step, stores),
+            (Truth::Exposure { settings, held }, Scene::Images(step)) => {
                 adaptation(settings, held, self.bound, step, stores)
             }
-            Truth::Composite(settings) => picture(settings, self.bound, step, stores),
+            (Truth::Composite(settings), Scene::Images(step)) => {
+                picture(settings, self.bound, step, stores)
+            }
+            (Truth::Stage, Scene::Stage(stage)) => drawn::wrong(stage, stores),
+            _ => None,
         };
         for Wrong { store, index, what } in wrong.unwrap_or_default() {
             let found = self.found.get_or_insert_with(|| Untrue {
@@ -119,14 +130,14 @@ impl Judge {
 }
 
 /// A texel that is not what it should be.
-struct Wrong<'a> {
-    store: &'a Store,
-    index: usize,
-    what: String,
+pub(super) struct Wrong<'a> {
+    pub(super) store: &'a Store,
+    pub(super) index: usize,
+    pub(super) what: String,
 }
 
 /// What a pass stored.
-fn of<'a>(stores: &'a [Store], pass: &str) -> Option<(&'a Store, Plane)> {
+pub(super) fn of<'a>(stores: &'a [Store], pass: &str) -> Option<(&'a Store, Plane)> {
     let store = stores.iter().find(|store| store.pass == pass)?;
     let plane = Plane::of(store.image.as_ref()?).ok()?;
     Some((store, plane))
@@ -238,7 +249,7 @@ mod tests {
 
     fn untrue(effect: &str, stores: &[Store], step: &Step) -> Option<Untrue> {
         let mut judge = Judge::new(effect, &[], None).unwrap();
-        judge.look(2, step, stores);
+        judge.look(2, &Scene::Images(Box::new(step.clone())), stores);
         judge.finish()
     }
 
@@ -282,7 +293,7 @@ mod tests {
                 1.0,
             ];
             let stores = stored("exposure/adapt", Format::Rgba32Float, [1, 1], &[texel]);
-            judge.look(number, &step, &stores);
+            judge.look(number, &Scene::Images(Box::new(step.clone())), &stores);
         }
         let found = judge.finish().unwrap();
         assert_eq!((found.texels, found.first.frame), (1, 2));

@@ -70,6 +70,9 @@ fn executors(body: &mut String, report: &Report) {
     for note in &report.notes {
         let _ = writeln!(body, "<p class=\"muted\">{}</p>", escape(note));
     }
+    for failure in &report.failures {
+        let _ = writeln!(body, "<p class=\"findings\">{}</p>", escape(failure));
+    }
 }
 
 fn cases(body: &mut String, report: &Report) {
@@ -140,6 +143,15 @@ fn row(body: &mut String, case: &CaseReport) {
             );
         }
         body.push_str("</ul>");
+    }
+    for one in &case.excused {
+        let _ = write!(
+            body,
+            "<br><span class=\"muted\">{}: {}, {}</span>",
+            escape(&one.finding.executor),
+            escape(&one.reason),
+            escape(&one.finding.text)
+        );
     }
     let place = rounding.map_or_else(String::new, |one| {
         format!(" title=\"{}\"", escape(&one.at.to_string()))

@@ -4,16 +4,17 @@ mod conclude;
 mod pair;
 
 use etalon_core::backend::BackendError;
-use etalon_effects::{EffectEntry, effect, effects};
 use etalon_scenes::cases::case;
 use thiserror::Error;
 
+use crate::exceptions::{BadLine, Exception, exceptions};
 use crate::executors::{Executor, Kind};
 use crate::functions;
 use crate::knobs;
-use crate::model::{ExecutorInfo, Report, Totals};
+use crate::model::{ExecutorInfo, Report};
 use crate::plant::Plant;
 use crate::sanitise::{AllowError, Watch};
+use crate::scene::Effect;
 use crate::subject::{Subject, SubjectError, subjects};
 pub(crate) use conclude::conclusions;
 use pair::Pair;
@@ -80,7 +81,7 @@ impl Progress for () {}
 #[non_exhaustive]
 pub enum RunError {
     /// No effect of that name.
-    #[error("there is no effect `{name}`; there are {}, and lib", effects().iter().map(|effect| effect.name).collect::<Vec<_>>().join(", "))]
+    #[error("there is no effect `{name}`; there are {}, and lib", Effect::names().collect::<Vec<_>>().join(", "))]
     NoEffect {
         /// As given.
         name: String,
@@ -97,6 +98,9 @@ pub enum RunError {
     /// A comment in a kernel that is for the sanitiser cannot be understood.
     #[error(transparent)]
     Allow(#[from] AllowError),
+    /// A line of the table of exceptions cannot be understood.
+    #[error(transparent)]
+    Exception(#[from] BadLine),
     /// An executor that `ETALON_REQUIRE` names is not there.
     #[error("{name} is required: {source}")]
     Required {
@@ -118,26 +122,26 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     let mut report = Report::default();
     let mut executors = open(&options.executors, &mut report)?;
     let mut watch = Watch::new()?;
+    let exceptions = exceptions()?;
     let mut kernels = etalon_effects::kernels();
     for (path, text) in &options.kernels {
         kernels.add_source(path, text);
     }
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
-    let mut named = std::collections::BTreeSet::new();
     for (subject, effects) in &chosen {
-        let steps = subject.steps()?;
-        let pixels = steps.first().map_or(0, |step| step.frame.size().pixels());
+        let scenes = subject.scenes()?;
+        let pixels = scenes.first().map_or(0, |scene| scene.size().pixels());
         if options.largest.is_some_and(|largest| pixels > largest) {
             continue;
         }
         for effect in effects {
-            progress.next(&subject.name, effect.name);
-            named.insert(subject.name.clone());
+            progress.next(&subject.name, effect.name());
             let pair = Pair {
                 subject,
                 effect,
-                steps: &steps,
+                scenes: &scenes,
                 kernels: &kernels,
+                exceptions: &exceptions,
                 plant: options.plant,
                 followed: pixels <= options.followed,
             };
@@ -146,7 +150,6 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     }
     if options.cases.is_empty() && options.asks_for(functions::LIBRARY) {
         let functions = functions::run(&mut executors, &mut watch, &options.kernels);
-        named.extend(functions.iter().map(|case| case.name.clone()));
         report.cases.extend(functions);
     }
     // Values that are not allowed cost no execution: they are tried whenever no
@@ -159,34 +162,49 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
             .refusals
             .retain(|refusal| options.asks_for(&refusal.effect));
     }
+    report.notes.extend(not_needed(&exceptions, &report));
     let (found, unused) = watch.finish();
     for found in found {
         report.sites.push(found.finding);
         report.maps.push(found.map);
     }
     // Of a part of the corpus nothing can be said of what is not found.
-    if options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none() {
+    let whole = options.cases.is_empty() && options.effects.is_empty() && options.largest.is_none();
+    if whole && options.executors.contains(&Kind::Sanitiser) {
         report.unused = unused;
     }
-    report.totals = Totals {
-        cases: named.len(),
-        pairs: report.cases.len(),
-        executions: report
-            .cases
-            .iter()
-            .flat_map(|case| &case.results)
-            .map(|result| result.executions)
-            .sum(),
-        refusals: report.refusals.len(),
-        findings: report.findings().count() + report.accepted().count(),
-    };
+    report.count();
     Ok(report)
 }
 
+/// Exceptions about a device that was there and a case that was run, for which nothing is
+/// excused.
+fn not_needed(exceptions: &[Exception], report: &Report) -> Vec<String> {
+    let devices = |one: &Exception| {
+        let mut executors = report.executors.iter();
+        executors.any(|executor| executor.device.contains(&one.device))
+    };
+    let idle = |one: &Exception| {
+        let mut cases = report.cases.iter();
+        cases.any(|case| {
+            case.name == one.case && case.effect == one.effect && case.excused.is_empty()
+        })
+    };
+    let found = exceptions.iter().filter(|one| devices(one) && idle(one));
+    found
+        .map(|one| {
+            format!(
+                "exceptions.txt: {} on {} by {} is not needed",
+                one.effect, one.case, one.device
+            )
+        })
+        .collect()
+}
+
 /// The cases asked for with their effects.
-fn choose(options: &Options) -> Result<Vec<(Subject, Vec<EffectEntry>)>, RunError> {
+fn choose(options: &Options) -> Result<Vec<(Subject, Vec<Effect>)>, RunError> {
     for name in &options.effects {
-        if effect(name).is_none() && name != functions::LIBRARY {
+        if !Effect::names().any(|known| known == name) && name != functions::LIBRARY {
             return Err(RunError::NoEffect { name: name.clone() });
         }
     }
@@ -207,7 +225,7 @@ fn choose(options: &Options) -> Result<Vec<(Subject, Vec<EffectEntry>)>, RunErro
                 .effects
                 .iter()
                 .copied()
-                .filter(|effect| options.asks_for(effect.name));
+                .filter(|effect| options.asks_for(effect.name()));
             let effects = effects.collect();
             (subject, effects)
         })
@@ -241,8 +259,10 @@ fn open(asked: &[Kind], report: &mut Report) -> Result<Vec<Executor>, RunError> 
     Ok(executors)
 }
 
+/// The variable that names backends which have to be there.
+pub(crate) const REQUIRED: &str = "ETALON_REQUIRE";
+
 /// Whether `ETALON_REQUIRE`, a list with commas, names a backend.
-fn required(backend: &str) -> bool {
-    std::env::var("ETALON_REQUIRE")
-        .is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
+pub(crate) fn required(backend: &str) -> bool {
+    std::env::var(REQUIRED).is_ok_and(|list| list.split(',').any(|name| name.trim() == backend))
 }

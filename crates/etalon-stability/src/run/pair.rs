@@ -2,26 +2,29 @@
 
 use std::collections::BTreeMap;
 
-use etalon_core::backend::BackendError;
+use etalon_core::backend::{BackendError, BackendInfo};
 use etalon_core::graph::Graph;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Plan, PlanError, PlanOptions};
 use etalon_core::resource::Limits;
 use etalon_cpu::StepSanitised;
+use etalon_effects::EffectError;
 use etalon_effects::knob::KnobValue;
 use etalon_effects::ssr::Ssr;
-use etalon_effects::{EffectEntry, EffectError};
-use etalon_scenes::cases::Step;
 use thiserror::Error;
 
 use super::conclude::conclusions;
+use crate::exceptions::Exception;
 use crate::executors::{Executor, Kind};
 use crate::judge::spread::{PERTURBATIONS, Spread};
-use crate::judge::{agreement, finite, recovery, rounding, truth};
-use crate::model::{CaseReport, ExecutorResult, ExpectedError, Finding, FindingKind, Status};
+use crate::judge::{agreement, drawn, finite, recovery, rounding, truth};
+use crate::model::{
+    CaseReport, Excused, ExecutorResult, ExpectedError, Finding, FindingKind, Status,
+};
 use crate::observe::{ObserveError, Store};
 use crate::plant::Plant;
 use crate::sanitise::{Counts, Watch};
+use crate::scene::{Drawing, Effect, Scene};
 use crate::subject::Subject;
 
 /// Why an executor has nothing to show.
@@ -53,10 +56,12 @@ impl ExecuteError {
 /// A case and an effect.
 pub(super) struct Pair<'a> {
     pub(super) subject: &'a Subject,
-    pub(super) effect: &'a EffectEntry,
-    pub(super) steps: &'a [Step],
+    pub(super) effect: &'a Effect,
+    pub(super) scenes: &'a [Scene],
     pub(super) kernels: &'a KernelLibrary,
     pub(super) plant: Option<Plant>,
+    /// What drivers are known to do otherwise.
+    pub(super) exceptions: &'a [Exception],
     /// Whether the frame is small enough for [`Kind::is_costly`].
     pub(super) followed: bool,
 }
@@ -73,6 +78,8 @@ struct Kept {
     double: Vec<(Arithmetic, Frames)>,
     /// How far perturbed executions are from each other in fast arithmetic, by frame.
     spread: Vec<Spread>,
+    /// What a device has drawn, in each arithmetic.
+    devices: Vec<(Arithmetic, Frames)>,
 }
 
 impl Kept {
@@ -91,18 +98,18 @@ impl Pair<'_> {
         let expected = subject
             .expected
             .iter()
-            .find(|known| known.effect == effect.name);
-        let size = self.steps.first().map_or([0, 0], |step| {
-            [step.frame.size().width(), step.frame.size().height()]
+            .find(|known| known.effect == effect.name());
+        let size = self.scenes.first().map_or([0, 0], |scene| {
+            [scene.size().width(), scene.size().height()]
         });
         let mut report = CaseReport {
             name: subject.name.clone(),
             family: subject.family.to_owned(),
-            effect: effect.name.to_owned(),
+            effect: effect.name().to_owned(),
             reason: subject.reason.clone(),
             source: subject.source.clone(),
             size,
-            frames: self.steps.len(),
+            frames: self.scenes.len(),
             knobs: subject
                 .knobs
                 .iter()
@@ -119,10 +126,35 @@ impl Pair<'_> {
             if executor.kind.is_costly() && !self.followed {
                 continue;
             }
-            let result = self.on(executor, watch, &mut kept, &mut report.findings);
+            // What is drawn is computed in f32, whatever the interpreter's number, and
+            // nobody looks into its kernels.
+            if self.effect.drawing() != Drawing::None
+                && !(executor.kind == Kind::Cpu || executor.kind.is_device())
+            {
+                continue;
+            }
+            let mut findings = Vec::new();
+            let result = self.on(executor, watch, &mut kept, &mut findings);
             report.results.push(result);
+            match self.exception(executor) {
+                Some(exception) => report.excused.extend(findings.into_iter().map(|finding| {
+                    let reason = exception.reason.clone();
+                    Excused { finding, reason }
+                })),
+                None => report.findings.append(&mut findings),
+            }
         }
         report
+    }
+
+    /// What an executor's driver is known for in this case.
+    fn exception(&self, executor: &Executor) -> Option<&Exception> {
+        if !executor.kind.is_device() {
+            return None;
+        }
+        let device = executor.info().device;
+        let mut exceptions = self.exceptions.iter();
+        exceptions.find(|one| one.excuses(&self.subject.name, self.effect.name(), &device))
     }
 
     /// Runs it on one executor, and keeps what others are held to.
@@ -145,7 +177,7 @@ impl Pair<'_> {
                 .contains(&("metering", KnobValue::Choice("arithmetic"))),
         );
         for &arithmetic in kind.arithmetics() {
-            let mut frames = match self.execute(executor, self.steps, arithmetic, &mut result) {
+            let mut frames = match self.execute(executor, self.scenes, arithmetic, &mut result) {
                 Ok(frames) => frames,
                 Err(error) => {
                     result.status = error.status();
@@ -159,7 +191,8 @@ impl Pair<'_> {
             }
             for (number, stores) in frames.iter().enumerate() {
                 result.stores += stores.len();
-                finite::look(number, stores, &mut result.non_finite);
+                let overflows = self.subject.overflows.is_some();
+                finite::look(number, stores, overflows, &mut result.non_finite);
             }
             match kind {
                 Kind::Cpu => {
@@ -178,8 +211,9 @@ impl Pair<'_> {
                         let double = double.and_then(|frames| frames.get(number));
                         let double = double.map_or(&[][..], Vec::as_slice);
                         let strict = arithmetic == Arithmetic::Strict;
-                        if let Some(step) = self.steps.get(number) {
-                            let shown = rounding::Shown::of(&step.frame.colour, self.blur());
+                        let light = self.scenes.get(number).and_then(Scene::light);
+                        if let Some(light) = light {
+                            let shown = rounding::Shown::of(light, self.blur());
                             errors.look(number, stores, double, &shown, strict);
                         }
                     }
@@ -188,7 +222,11 @@ impl Pair<'_> {
                     findings.extend(watch.checked(kind, executor.take_checked()));
                     let steps = executor.take_sanitised();
                     let counts = result.sanitised.get_or_insert_default();
-                    let case = format!("{}, {}, {arithmetic}", self.subject.name, self.effect.name);
+                    let case = format!(
+                        "{}, {}, {arithmetic}",
+                        self.subject.name,
+                        self.effect.name()
+                    );
                     findings.extend(watch.look(&case, &steps, self.expected(), counts));
                     decisions(&steps, &frames, kept.double(arithmetic), counts);
                 }
@@ -196,7 +234,7 @@ impl Pair<'_> {
                     kept.spread = frames.iter().map(|stores| Spread::around(stores)).collect();
                     for seed in 0..PERTURBATIONS {
                         executor.perturb(Some(seed));
-                        match self.execute(executor, self.steps, arithmetic, &mut result) {
+                        match self.execute(executor, self.scenes, arithmetic, &mut result) {
                             Ok(moved) => {
                                 for (spread, stores) in kept.spread.iter_mut().zip(&moved) {
                                     spread.widen(stores);
@@ -207,6 +245,10 @@ impl Pair<'_> {
                     }
                     executor.perturb(None);
                     result.spread = Some(Spread::summary(&kept.spread));
+                }
+                Kind::Wgpu | Kind::Ash if self.effect.drawing() != Drawing::None => {
+                    self.drawn(&executor.info(), arithmetic, kept, &frames, &mut result);
+                    kept.devices.push((arithmetic, frames));
                 }
                 Kind::Wgpu | Kind::Ash if arithmetic == Arithmetic::Strict => {
                     let pairs = kept.reference.iter().zip(&frames);
@@ -228,11 +270,39 @@ impl Pair<'_> {
         result
     }
 
+    /// Holds what a device has drawn to the interpreter, within what rasterisers are
+    /// free to do, and to what another backend has drawn on the same device, bit by bit.
+    fn drawn(
+        &self,
+        info: &BackendInfo,
+        arithmetic: Arithmetic,
+        kept: &Kept,
+        frames: &Frames,
+        result: &mut ExecutorResult,
+    ) {
+        let rules = drawn::Rules {
+            drawing: self.effect.drawing(),
+            same_grid: info.device.contains("llvmpipe"),
+            strict: arithmetic == Arithmetic::Strict,
+            layers: self.scenes.first().map_or(0, drawn::layers),
+        };
+        for (number, (reference, subject)) in kept.reference.iter().zip(frames).enumerate() {
+            rules.compare(number, reference, subject, &mut result.difference);
+        }
+        let mut devices = kept.devices.iter();
+        if let Some((_, before)) = devices.find(|(known, _)| *known == arithmetic) {
+            for (number, (reference, subject)) in before.iter().zip(frames).enumerate() {
+                agreement::compare(number, reference, subject, &mut result.difference);
+            }
+        }
+    }
+
     /// What of a case's frames is not what the effect's truth says.
     fn truth(&self, frames: &Frames) -> Option<truth::Untrue> {
-        let mut judge = truth::Judge::new(self.effect.name, &self.subject.knobs, self.expected())?;
-        for (number, (step, stores)) in self.steps.iter().zip(frames).enumerate() {
-            judge.look(number, step, stores);
+        let mut judge =
+            truth::Judge::new(self.effect.name(), &self.subject.knobs, self.expected())?;
+        for (number, (scene, stores)) in self.scenes.iter().zip(frames).enumerate() {
+            judge.look(number, scene, stores);
         }
         judge.finish()
     }
@@ -241,7 +311,7 @@ impl Pair<'_> {
     fn expected(&self) -> Option<f64> {
         let declared = self.subject.expected.iter();
         declared
-            .filter(|known| known.effect == self.effect.name)
+            .filter(|known| known.effect == self.effect.name())
             .map(|known| known.bound)
             .next()
     }
@@ -250,21 +320,21 @@ impl Pair<'_> {
     fn execute(
         &self,
         executor: &mut Executor,
-        steps: &[Step],
+        scenes: &[Scene],
         arithmetic: Arithmetic,
         result: &mut ExecutorResult,
     ) -> Result<Frames, ExecuteError> {
         executor.reset();
         let mut frames = Vec::new();
-        for step in steps {
-            let graph = self.subject.graph(self.effect, step)?;
+        for scene in scenes {
+            let graph = self.subject.graph(self.effect, scene)?;
             let plan = self.plan(executor, &graph, arithmetic)?;
             // An effect that is off hands on what it was given.
             if plan.steps.is_empty() {
                 frames.push(Vec::new());
                 continue;
             }
-            frames.push(executor.run(&plan, &step.frame.inputs())?);
+            frames.push(executor.run(&plan, &scene.inputs())?);
             result.executions += 1;
         }
         Ok(frames)
@@ -320,12 +390,12 @@ impl Pair<'_> {
     /// replaced by the one after it.
     fn recovery(&self, executor: &mut Executor, faulty: &[Vec<Store>]) -> Option<Finding> {
         let recovery = self.subject.recovery?;
-        if recovery.effect != self.effect.name {
+        if recovery.effect != self.effect.name() {
             return None;
         }
-        let mut steps = self.steps.to_vec();
-        let good = steps.get(recovery.poisoned + 1)?.clone();
-        *steps.get_mut(recovery.poisoned)? = good;
+        let mut scenes = self.scenes.to_vec();
+        let good = scenes.get(recovery.poisoned + 1)?.clone();
+        *scenes.get_mut(recovery.poisoned)? = good;
         let mut result = ExecutorResult::default();
         let strict = Arithmetic::Strict;
         let finding = |text| Finding {
@@ -333,7 +403,7 @@ impl Pair<'_> {
             executor: Kind::Cpu.to_string(),
             text,
         };
-        let clean = match self.execute(executor, &steps, strict, &mut result) {
+        let clean = match self.execute(executor, &scenes, strict, &mut result) {
             Ok(clean) => clean,
             Err(error) => return Some(finding(error.to_string())),
         };

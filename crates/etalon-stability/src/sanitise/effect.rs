@@ -13,6 +13,7 @@ pub struct Effect {
     pub changed: u64,
     /// The largest difference, relative to the larger of the two numbers or to 2⁻¹⁴ if
     /// that is more.
+    #[serde(with = "crate::number")]
     pub largest: f64,
 }
 

@@ -57,6 +57,11 @@ fn every_effect_on_every_case_stores_the_same_numbers_everywhere() {
         if case.family == functions::FAMILY {
             continue;
         }
+        // What is drawn is computed in f32 whatever the interpreter's number.
+        let rastered = ["geometry", "lighting", "forward"];
+        if rastered.contains(&case.effect.as_str()) {
+            continue;
+        }
         let shadow = case.on("cpu-shadow").unwrap();
         assert!(
             shadow.rounding.is_some() || is_off(&case.name),

@@ -92,7 +92,7 @@ impl Request {
             let reason = "all that mirrors is perfectly smooth";
             graph.decide("ssr/blur", Decision::absent(reason));
         }
-        if let Some(reason) = ssr::demand::other_rate(&asked, &suited, &self.demands) {
+        if let Some(reason) = ssr::demand::other_rate(&asked, &suited, &self.calls()) {
             let decision = if suited.quarter_from == 0.0 {
                 Decision::runs(reason)
             } else {

@@ -49,6 +49,7 @@ fn drawn(
 /// What every texel has.
 struct Screen {
     size: [u32; 2],
+    near: f64,
     depth: Vec<[f32; 4]>,
     specular: Vec<[f32; 4]>,
     velocity: Vec<[f32; 4]>,
@@ -65,6 +66,7 @@ impl Screen {
         let texels = |of: &Execution, name: &str| of.output(name).unwrap().to_rgba_f32().unwrap();
         Self {
             size: [size.width(), size.height()],
+            near: shot.camera().projection(size).unwrap().near(),
             depth: texels(&all, "depth"),
             specular: texels(&all, "specular"),
             velocity: texels(&all, "velocity"),
@@ -77,6 +79,7 @@ impl Screen {
         let texels = |name: &str| frame.image(name).unwrap().to_rgba_f32().unwrap();
         Self {
             size: [frame.size().width(), frame.size().height()],
+            near: frame.camera.projection.near(),
             depth: texels("depth"),
             specular: texels("specular"),
             velocity: texels("velocity"),
@@ -113,6 +116,11 @@ impl Screen {
                     return Err(format!(
                         "{specular} is mirrored by a roughness of {roughness} at {at:?}: {mirror:?}"
                     ));
+                }
+                let distance = self.near / f64::from(self.depth[index][0]);
+                // Both are rounded to f32.
+                if distance < (1.0 - 1e-6) * f64::from(mirror.nearest) {
+                    return Err(format!("a mirror at {distance} at {at:?}: {mirror:?}"));
                 }
             }
             // Bits, as some are no numbers.
@@ -288,6 +296,15 @@ fn images_hold_what_they_say_and_that_exactly() {
                 }
             }
         }
+        if let Some(mirror) = demands.reflective {
+            let mirrors = screen.specular.iter().zip(&screen.depth);
+            let depth = mirrors
+                .filter(|(texel, _)| texel[..3].iter().any(|&channel| channel > 0.0))
+                .fold(0.0_f64, |most, (_, depth)| most.max(depth[0].into()));
+            let exact = screen.near / depth;
+            let nearest = f64::from(mirror.nearest);
+            assert!((nearest - exact).abs() <= 1e-6 * exact, "{nearest} {exact}");
+        }
         let found = demands
             .reflective
             .map(|mirror| mirror.region.texels([96, 54]));
@@ -316,7 +333,7 @@ fn demands_that_say_too_little_are_caught() {
     screen.check(&full).unwrap();
     let left = Region::new([0.0, 0.0], [0.3, 1.0]);
     type Plant = (&'static str, fn(&mut Demands, Region));
-    let plants: [Plant; 10] = [
+    let plants: [Plant; 11] = [
         ("a surface", |demands, left| demands.surfaces = Some(left)),
         ("a surface", |demands, _| demands.surfaces = None),
         ("a mirror", |demands, left| {
@@ -333,6 +350,11 @@ fn demands_that_say_too_little_are_caught() {
         ("is mirrored by", |demands, _| {
             if let Some(mirror) = &mut demands.reflective {
                 mirror.roughness = [0.5, 1.0];
+            }
+        }),
+        ("a mirror at", |demands, _| {
+            if let Some(mirror) = &mut demands.reflective {
+                mirror.nearest = 100.0;
             }
         }),
         ("seen through", |demands, _| demands.transparent = None),

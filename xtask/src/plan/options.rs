@@ -101,6 +101,9 @@ pub struct Options {
     /// March one texel in four unless something mirrors more of a colour than this
     #[arg(long, value_name = "0..1", default_value_t = Thresholds::default().faint_specular)]
     pub faint_specular: f32,
+    /// March one texel in four unless something that mirrors is nearer, in view units
+    #[arg(long, value_name = "DISTANCE", default_value_t = Thresholds::default().distant)]
+    pub distant: f32,
     /// Plan as if anything could be anywhere on the screen
     #[arg(long)]
     pub everything: bool,
@@ -199,6 +202,7 @@ impl Options {
             max_roughness: self.max_roughness,
             min_specular: self.min_specular,
             faint_specular: self.faint_specular,
+            distant: self.distant,
             ..Thresholds::default()
         }
     }

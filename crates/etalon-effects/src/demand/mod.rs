@@ -37,6 +37,9 @@ pub struct Reflective {
     /// The largest share of a colour that one of them mirrors at normal incidence, in
     /// `[0, 1]`.
     pub specular: f32,
+    /// Distance of the nearest of them from the plane of the eye along the view axis,
+    /// in view units, at least 0.
+    pub nearest: f32,
 }
 
 impl Reflective {
@@ -50,6 +53,7 @@ impl Reflective {
                 self.roughness[1].max(other.roughness[1]),
             ],
             specular: self.specular.max(other.specular),
+            nearest: self.nearest.min(other.nearest),
         }
     }
 }
@@ -113,6 +117,7 @@ impl Moving {
 ///         region,
 ///         roughness: [0.02, 0.1],
 ///         specular: 0.05,
+///         nearest: 1.5,
 ///     }),
 ///     None => demands,
 /// };
@@ -144,6 +149,7 @@ impl Demands {
                 region: Region::FULL,
                 roughness: [0.0, 1.0],
                 specular: 1.0,
+                nearest: 0.0,
             }),
             transparent: Some(Region::FULL),
             bright: Some(Bright {
@@ -238,6 +244,7 @@ impl Demands {
             check.range("roughness of the smoothest", smoothest, 0.0, 1.0)?;
             check.range("roughness of the roughest", roughest, smoothest, 1.0)?;
             check.range("specular", reflective.specular, 0.0, 1.0)?;
+            check.range("nearest", reflective.nearest, 0.0, f32::INFINITY)?;
         }
         if let Some(bright) = &self.bright {
             check.range("peak", bright.peak, 0.0, 65_504.0)?;
@@ -260,6 +267,10 @@ pub struct Thresholds {
     /// Share of a colour up to which reflections are faint, in `[0, 1]`: if no surface
     /// mirrors more, one texel in four is marched. 0 does that to none.
     pub faint_specular: f32,
+    /// Distance in view units from which reflections are distant, at least 0: if no
+    /// surface that mirrors is nearer, one texel in four is marched. Infinity, the
+    /// default, does that to none.
+    pub distant: f32,
     /// What reflections take on the device, on tiles and without, as `cargo xtask
     /// economy` measures it: where what mirrors covers more of the screen than tiles
     /// are worth, they are off. For bounds that are tight; `None` leaves it to
@@ -274,6 +285,7 @@ impl Default for Thresholds {
             max_roughness: 1.0,
             min_specular: 0.0,
             faint_specular: 0.0,
+            distant: f32::INFINITY,
             tiles: None,
         }
     }
@@ -288,7 +300,8 @@ impl Thresholds {
         let check = Settings("thresholds");
         check.range("max_roughness", self.max_roughness, 0.0, 1.0)?;
         check.range("min_specular", self.min_specular, 0.0, 1.0)?;
-        check.range("faint_specular", self.faint_specular, 0.0, 1.0)
+        check.range("faint_specular", self.faint_specular, 0.0, 1.0)?;
+        check.range("distant", self.distant, 0.0, f32::INFINITY)
     }
 }
 

@@ -46,7 +46,8 @@ pub(crate) fn decide(calls: &Calls<'_>) -> Decision {
 /// perfectly smooth, the blur has no share in the mix; where nothing is as rough as what
 /// is marched at a quarter of the rate, or nothing smoother, there is one rate; and where
 /// most of the screen mirrors, tiles save less than they cost. The picture stays the same
-/// but where reflections are [faint](Thresholds::faint_specular).
+/// but where reflections are [faint](Thresholds::faint_specular) or
+/// [distant](Thresholds::distant).
 pub(crate) fn suited(settings: &Ssr, demands: &Demands, thresholds: &Thresholds) -> Ssr {
     let Some(reflective) = demands.reflective else {
         return *settings;
@@ -69,7 +70,8 @@ fn quarter_from(settings: &Ssr, reflective: &Reflective, thresholds: &Thresholds
     const STEP: f32 = 1.0 / 255.0;
     let [smoothest, roughest] = reflective.roughness;
     let limit = settings.quarter_from;
-    if reflective.specular <= thresholds.faint_specular || smoothest >= limit + STEP {
+    let faint = reflective.specular <= thresholds.faint_specular;
+    if faint || is_distant(reflective, thresholds) || smoothest >= limit + STEP {
         0.0
     } else if roughest <= limit - STEP {
         Ssr::NO_QUARTER
@@ -78,15 +80,25 @@ fn quarter_from(settings: &Ssr, reflective: &Reflective, thresholds: &Thresholds
     }
 }
 
+fn is_distant(reflective: &Reflective, thresholds: &Thresholds) -> bool {
+    // A distance that nobody set is not reached by infinite ones either.
+    thresholds.distant.is_finite() && reflective.nearest >= thresholds.distant
+}
+
 /// Why [`suited`] settings march at another rate than was asked for, if they do.
-pub(crate) fn other_rate(asked: &Ssr, suited: &Ssr, demands: &Demands) -> Option<String> {
-    let reflective = demands.reflective?;
+pub(crate) fn other_rate(asked: &Ssr, suited: &Ssr, calls: &Calls<'_>) -> Option<String> {
+    let reflective = calls.demands.reflective?;
     let [smoothest, roughest] = reflective.roughness;
     if asked.quarter_from == suited.quarter_from {
         return None;
     }
     Some(if suited.quarter_from != 0.0 {
         format!("nothing that mirrors is rougher than {roughest}: every texel is marched")
+    } else if is_distant(&reflective, calls.thresholds) {
+        format!(
+            "no surface that mirrors is nearer than {}: one texel in four is marched",
+            reflective.nearest
+        )
     } else if smoothest < asked.quarter_from {
         format!(
             "no surface mirrors more than {} of a colour: one texel in four is marched",

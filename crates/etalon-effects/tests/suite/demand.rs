@@ -23,6 +23,7 @@ const REFLECTIVE: Reflective = Reflective {
     region: Region::FULL,
     roughness: [0.25, 0.5],
     specular: 0.5,
+    nearest: 8.0,
 };
 
 fn inputs(graph: &mut Graph, width: u32, height: u32) -> SceneInputs {
@@ -116,17 +117,18 @@ fn reflections_run_only_where_something_mirrors_that_is_smooth_enough() {
     );
 }
 
-/// One rate where nothing calls for two, and a quarter of it where reflections are faint.
+/// One rate where nothing calls for two, and a quarter of it where reflections are faint
+/// or distant.
 #[test]
 fn rays_are_as_many_as_surfaces_call_for() {
     let kernels = etalon_effects::kernels();
-    let told = |asked: f32, roughness: [f32; 2], faint_specular: f32| {
+    let told_of = |asked: f32, roughness: [f32; 2], thresholds: Thresholds| {
         let mut request = Request::default();
         request.demands.reflective = Some(Reflective {
             roughness,
             ..REFLECTIVE
         });
-        request.thresholds.faint_specular = faint_specular;
+        request.thresholds = thresholds;
         request.settings.ssr = Some(Ssr {
             quarter_from: asked,
             ..Ssr::default()
@@ -142,6 +144,13 @@ fn rays_are_as_many_as_surfaces_call_for() {
             .next();
         let rate = request.called_for().ssr.map(|ssr| ssr.quarter_from);
         (rate.expect("on"), reason.unwrap_or_default())
+    };
+    let told = |asked: f32, roughness: [f32; 2], faint_specular: f32| {
+        let thresholds = Thresholds {
+            faint_specular,
+            ..Thresholds::default()
+        };
+        told_of(asked, roughness, thresholds)
     };
     let none = Ssr::NO_QUARTER;
     assert_eq!(told(0.5, [0.25, 0.75], 0.0), (0.5, String::new()));
@@ -169,6 +178,18 @@ fn rays_are_as_many_as_surfaces_call_for() {
     assert_eq!(
         reason,
         "no surface mirrors more than 0.5 of a colour: one texel in four is marched"
+    );
+    // The nearest is at 8.
+    let beyond = |distant| Thresholds {
+        distant,
+        ..Thresholds::default()
+    };
+    assert_eq!(told_of(none, [0.25, 0.75], beyond(8.5)).0, none);
+    let (rate, reason) = told_of(none, [0.25, 0.75], beyond(8.0));
+    assert_eq!(rate, 0.0);
+    assert_eq!(
+        reason,
+        "no surface that mirrors is nearer than 8: one texel in four is marched"
     );
 }
 
@@ -394,6 +415,13 @@ fn demands_that_are_no_numbers_are_refused() {
         ),
         (reflective([0.5, 0.2], 0.5), "roughness of the roughest"),
         (reflective([0.0, 1.0], 1.5), "specular"),
+        (
+            Reflective {
+                nearest: -1.0,
+                ..REFLECTIVE
+            },
+            "nearest",
+        ),
     ] {
         assert_eq!(
             refused(&|request| request.demands.reflective = Some(mirror)),
@@ -424,6 +452,10 @@ fn demands_that_are_no_numbers_are_refused() {
         "faint_specular"
     );
     assert_eq!(
+        refused(&|request| request.thresholds.distant = f32::NAN),
+        "distant"
+    );
+    assert_eq!(
         refused(&|request| request.thresholds.min_specular = -1.0),
         "min_specular"
     );
@@ -450,6 +482,7 @@ fn demands_add_up() {
             region: right,
             roughness: [0.1, 0.3],
             specular: 0.7,
+            nearest: 3.0,
         })
         .with_bright(Bright {
             peak: 9.0,
@@ -463,6 +496,7 @@ fn demands_add_up() {
     let mirror = both.reflective.expect("both have it");
     assert_eq!(mirror.region, left.union(right));
     assert_eq!((mirror.roughness, mirror.specular), ([0.1, 0.5], 0.7));
+    assert_eq!(mirror.nearest, 3.0);
     let bright = both.bright.expect("both have it");
     assert_eq!((bright.peak, bright.floor), (9.0, 2.0));
     assert_eq!((both.surfaces, both.transparent), (Some(left), Some(right)));

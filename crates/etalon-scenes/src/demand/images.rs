@@ -60,7 +60,9 @@ impl Frame {
         let mut demands = Demands::default();
 
         let mut surfaces = Bounds::default();
+        let mut depths = Vec::with_capacity(self.size().pixels());
         each(&self.depth, |x, y, [depth, ..]| {
+            depths.push(depth);
             if depth != 0.0 {
                 surfaces.add(x, y);
             }
@@ -71,9 +73,18 @@ impl Frame {
 
         let mut mirrors = Bounds::default();
         let (mut smoothest, mut roughest, mut most) = (1.0_f32, 0.0_f32, 0.0_f32);
+        let mut depth = 0.0_f32;
+        let mut places = depths.into_iter();
         each(&self.specular, |x, y, [r, g, b, shininess]| {
             let specular = r.max(g).max(b);
+            let own = places.next().unwrap_or(f32::INFINITY);
             if specular > 0.0 {
+                // What is no number is as near as can be.
+                depth = if own >= 0.0 {
+                    depth.max(own)
+                } else {
+                    f32::INFINITY
+                };
                 mirrors.add(x, y);
                 let roughness = 1.0 - shininess;
                 smoothest = smoothest.min(roughness);
@@ -86,6 +97,7 @@ impl Frame {
                 region,
                 roughness: [smoothest, roughest],
                 specular: most,
+                nearest: self.camera.projection.near() as f32 / depth,
             });
         }
 

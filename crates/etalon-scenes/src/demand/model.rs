@@ -9,7 +9,7 @@ use glam::{DMat4, DVec3, Vec3};
 
 use super::DIM;
 use super::light::{MOST, brightest};
-use super::projected;
+use super::projected::{self, Seen};
 use crate::camera::CameraError;
 use crate::frame::FrameSize;
 use crate::model::{Instance, Material, Model, Shot, TextureUse, is_blended, view};
@@ -52,8 +52,8 @@ impl Shot {
             ..Lit::default()
         };
         for instance in self.snapshot().instances.all() {
-            if let Some(region) = parts.region(instance) {
-                demands = parts.add(demands, &mut light, instance, region);
+            if let Some(seen) = parts.seen(instance) {
+                demands = parts.add(demands, &mut light, instance, seen);
             }
         }
         Ok(match light.bright() {
@@ -119,12 +119,12 @@ impl Parts<'_> {
     }
 
     /// Where an instance is on the screen, if it is.
-    fn region(&self, instance: &Instance) -> Option<Region> {
+    fn seen(&self, instance: &Instance) -> Option<Seen> {
         if instance.skin.is_some() {
-            return Some(Region::FULL);
+            return Some(Seen::FULL);
         }
         let world = instance.world.as_dmat4();
-        projected::region(self.bounds(instance), world, &self.view, self.size)
+        projected::seen(self.bounds(instance), world, &self.view, self.size)
     }
 
     fn add(
@@ -132,7 +132,7 @@ impl Parts<'_> {
         mut demands: Demands,
         light: &mut Lit,
         instance: &Instance,
-        region: Region,
+        Seen { region, nearest }: Seen,
     ) -> Demands {
         let material = self.model().parts().materials[instance.material].clone();
         let blended = is_blended(self.model(), instance);
@@ -147,6 +147,7 @@ impl Parts<'_> {
                     region,
                     roughness: [(smoothest - STEP).max(0.0), (roughest + STEP).min(1.0)],
                     specular: (specular + STEP).min(1.0),
+                    nearest,
                 });
             }
             if instance.skin.is_some() || instance.world != instance.previous {

@@ -4,18 +4,30 @@ use etalon_effects::demand::Region;
 use etalon_effects::geometry::View;
 use glam::{DMat4, DVec3};
 
-/// The region that holds all texels which triangles within a box can cover.
+/// Where on the screen something is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Seen {
+    /// Holds all texels that it can cover.
+    pub region: Region,
+    /// Distance along the view axis below which nothing of it is.
+    pub nearest: f32,
+}
+
+impl Seen {
+    /// Anywhere.
+    pub(super) const FULL: Self = Self {
+        region: Region::FULL,
+        nearest: 0.0,
+    };
+}
+
+/// Where triangles within a box can be seen.
 ///
 /// The part of the box in front of the near plane is projected corner by corner: what
 /// is within it is seen within the hull of those. Corners are where f32 can put them,
 /// and the region has a border of one texel, since rasterisers move vertices by up to
 /// a 512th of one and cover texels whose centres are in.
-pub(super) fn region(
-    bounds: [DVec3; 2],
-    world: DMat4,
-    view: &View,
-    size: [u32; 2],
-) -> Option<Region> {
+pub(super) fn seen(bounds: [DVec3; 2], world: DMat4, view: &View, size: [u32; 2]) -> Option<Seen> {
     let world_view = view.view * world;
     let near = f64::from(view.camera.near);
     let corners: [DVec3; 8] = std::array::from_fn(|corner| {
@@ -30,7 +42,7 @@ pub(super) fn region(
     let mut seen: Vec<(DVec3, f64)> = Vec::with_capacity(20);
     for (place, error) in placed.iter().zip(errors) {
         if !place.is_finite() {
-            return Some(Region::FULL);
+            return Some(Seen::FULL);
         }
         if -place.z >= near {
             seen.push((*place, error));
@@ -49,8 +61,10 @@ pub(super) fn region(
     let scale = view.camera.scale.as_dvec2();
     let centre = view.camera.centre.as_dvec2();
     let mut rectangle: Option<[[f64; 2]; 2]> = None;
+    let mut nearest = f64::INFINITY;
     for (place, error) in seen {
         let distance = -place.z;
+        nearest = nearest.min(distance - error);
         let at = [
             0.5 + 0.5 * (scale.x * place.x / distance + centre.x),
             0.5 - 0.5 * (scale.y * place.y / distance + centre.y),
@@ -72,7 +86,11 @@ pub(super) fn region(
     let border = size.map(|side| 1.0 / f64::from(side.max(1)));
     let low = [0, 1].map(|axis| (min[axis] - border[axis]) as f32);
     let high = [0, 1].map(|axis| (max[axis] + border[axis]) as f32);
-    Region::new(low, high)
+    Some(Seen {
+        region: Region::new(low, high)?,
+        // Depth is stored in f32, a fragment's from rounded ones of its corners.
+        nearest: ((1.0 - 1e-5) * nearest).max(0.0) as f32,
+    })
 }
 
 /// How far off f32 can be where it places a corner: some roundings of each product.
@@ -102,13 +120,28 @@ mod tests {
         }
     }
 
-    fn seen(low: [f64; 3], high: [f64; 3]) -> Option<Region> {
-        region([low.into(), high.into()], DMat4::IDENTITY, &view(), SIZE)
+    fn region(low: [f64; 3], high: [f64; 3]) -> Option<Region> {
+        let bounds = [low.into(), high.into()];
+        Some(seen(bounds, DMat4::IDENTITY, &view(), SIZE)?.region)
     }
 
     #[test]
-    fn a_box_in_front_is_where_its_nearest_face_is_seen() {
-        let region = seen([-0.5, -0.25, -3.0], [0.5, 0.25, -1.0]).unwrap();
+    fn the_nearest_is_a_corner_or_where_the_near_plane_cuts() {
+        let nearest = |low: [f64; 3], high: [f64; 3]| {
+            let bounds = [low.into(), high.into()];
+            seen(bounds, DMat4::IDENTITY, &view(), SIZE)
+                .unwrap()
+                .nearest
+        };
+        let close = |found: f32, exact: f32| found <= exact && found > exact * 0.999;
+        assert!(close(nearest([-0.5, -0.25, -3.0], [0.5, 0.25, -1.0]), 1.0));
+        assert!(close(nearest([-0.5, -0.25, -3e6], [0.5, 0.25, -2e6]), 2e6));
+        assert!(close(nearest([-1.0, -1.0, -3.0], [1.0, 1.0, 3.0]), 0.1));
+    }
+
+    #[test]
+    fn a_box_in_front_is_where_its_nearest_face_is_region() {
+        let region = region([-0.5, -0.25, -3.0], [0.5, 0.25, -1.0]).unwrap();
         // u = ½ + ½ · ½ x / d, v = ½ − ½ y / d, and a texel around it.
         let texels = region.texels(SIZE);
         // The border's edge is on a texel's edge up to rounding.
@@ -119,22 +152,22 @@ mod tests {
     }
 
     #[test]
-    fn what_is_behind_or_beside_is_not_seen() {
-        assert_eq!(seen([-1.0, -1.0, 1.0], [1.0, 1.0, 3.0]), None);
-        assert_eq!(seen([-1.0, -1.0, -0.05], [1.0, 1.0, 3.0]), None);
-        assert_eq!(seen([90.0, -1.0, -3.0], [99.0, 1.0, -2.0]), None);
+    fn what_is_behind_or_beside_is_not_region() {
+        assert_eq!(region([-1.0, -1.0, 1.0], [1.0, 1.0, 3.0]), None);
+        assert_eq!(region([-1.0, -1.0, -0.05], [1.0, 1.0, 3.0]), None);
+        assert_eq!(region([90.0, -1.0, -3.0], [99.0, 1.0, -2.0]), None);
         // Up to a texel beside it may be.
-        assert!(seen([4.01, -1.0, -2.1], [9.0, 1.0, -2.0]).is_some());
+        assert!(region([4.01, -1.0, -2.1], [9.0, 1.0, -2.0]).is_some());
     }
 
     #[test]
     fn what_reaches_behind_the_camera_is_cut_at_the_near_plane() {
         assert_eq!(
-            seen([-1.0, -1.0, -3.0], [1.0, 1.0, 3.0]),
+            region([-1.0, -1.0, -3.0], [1.0, 1.0, 3.0]),
             Some(Region::FULL)
         );
         // A wall to the right, from far ahead to far behind.
-        let region = seen([1.0, -1.0, -1e4], [1.5, 1.0, 1e4]).unwrap();
+        let region = region([1.0, -1.0, -1e4], [1.5, 1.0, 1e4]).unwrap();
         assert!(region.min()[0] > 0.49 && region.min()[0] <= 0.5);
         assert_eq!(region.max()[0], 1.0);
     }

@@ -152,6 +152,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             state: &state,
             colours,
             depth: Some(Format::Depth32Float),
+            sanitise: false,
         };
         let program = RasterProgram::from_module("sphere", KERNELS, &module, &info, &desc)?;
         let resources: Vec<BoundResource<'_>> = program
@@ -200,7 +201,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             for _ in 0..rounds {
                 depth_view.fill(Texel::Float([0.0; 4]));
                 let start = Instant::now();
-                counters = program.draw(&executor, &draw)?;
+                counters = program.draw(&executor, &draw)?.counters;
                 best = best.min(start.elapsed().as_secs_f64());
             }
             let triangles = counters.primitives as f64;

@@ -49,6 +49,6 @@ pub use memory::{Buffer, Texture, TextureView};
 pub use num::NumberType;
 pub use program::{BoundResource, DispatchReport, Program, TranslateOptions};
 pub use raster::{
-    DrawCounters, DrawRange, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram,
-    VertexBuffer,
+    DrawCounters, DrawRange, DrawReport, DrawSanitised, IndexBuffer, RasterDesc, RasterDraw,
+    RasterError, RasterProgram, VertexBuffer,
 };

@@ -1,7 +1,7 @@
 //! Programs: kernels made ready to run.
 
 use std::fmt;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use etalon_core::kernel::Kernel;
 use etalon_core::resource::{Dimension, SamplerDesc, TextureDesc};
@@ -11,10 +11,10 @@ use naga::{Module, ShaderStage, Span};
 use crate::binding::{BindingInfo, BindingKind, ChannelKind, View};
 use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
-use crate::exec::{DispatchCounters, Executor, Linked, Profile, Recording, Resource, Tier};
+use crate::exec::{DispatchCounters, Executor, Linked, Links, Profile, Recording, Resource};
 use crate::finding::{Checks, Finding};
 use crate::memory::{Buffer, TextureView, written};
-use crate::num::{Number, NumberType, Shadow};
+use crate::num::{Number, NumberType};
 use crate::report::workgroup_id;
 use crate::sanitise::Sanitised;
 use crate::translate::{self, Fail};
@@ -30,9 +30,7 @@ pub struct Program {
     immediates: Option<u32>,
     pub(crate) code: Code,
     local_ids: exec::LocalIds,
-    singles: ByTier<f32>,
-    doubles: ByTier<f64>,
-    shadowed: ByTier<Shadow>,
+    links: Links,
     recording: Mutex<Recording>,
     pub(crate) locate: Box<dyn Fn(Span) -> Location + Send + Sync>,
 }
@@ -63,10 +61,6 @@ pub struct DispatchReport {
     /// What the sanitiser found; nothing unless [`TranslateOptions::sanitise`] was set.
     pub sanitised: Sanitised,
 }
-
-/// The code linked to the handlers of a number type, by instruction set; each
-/// when it is first needed.
-type ByTier<N> = [OnceLock<Linked<N>>; Tier::ALL.len()];
 
 /// What a binding is given.
 #[derive(Clone, Debug)]
@@ -233,9 +227,7 @@ impl Program {
             immediates: translation.immediates,
             code,
             local_ids: exec::LocalIds::new(workgroup_size),
-            singles: Default::default(),
-            doubles: Default::default(),
-            shadowed: Default::default(),
+            links: Links::default(),
             recording: Mutex::default(),
             locate,
         })
@@ -317,10 +309,20 @@ impl Program {
         }
         // Where translation has put it.
         bound.push(Resource::Buffer(&immediates));
+        let (links, code, tier) = (&self.links, &self.code, executor.tier());
         match executor.number_type() {
-            NumberType::F32 => self.run(executor, workgroups, resources, &bound, &self.singles),
-            NumberType::F64 => self.run(executor, workgroups, resources, &bound, &self.doubles),
-            NumberType::Shadow => self.run(executor, workgroups, resources, &bound, &self.shadowed),
+            NumberType::F32 => {
+                let linked = links.singles(code, tier);
+                self.run(executor, workgroups, resources, &bound, linked)
+            }
+            NumberType::F64 => {
+                let linked = links.doubles(code, tier);
+                self.run(executor, workgroups, resources, &bound, linked)
+            }
+            NumberType::Shadow => {
+                let linked = links.shadowed(code, tier);
+                self.run(executor, workgroups, resources, &bound, linked)
+            }
         }
     }
 
@@ -330,14 +332,13 @@ impl Program {
         workgroups: [u32; 3],
         bound: &[BoundResource<'_>],
         resources: &[Resource<'_>],
-        linked: &ByTier<N>,
+        linked: &Linked<N>,
     ) -> Result<DispatchReport, RunError> {
-        let tier = executor.tier();
         let shadows = self.shadows(bound);
         let heat = self.heat(workgroups);
         let job = exec::Job {
             code: &self.code,
-            linked: linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier)),
+            linked,
             resources,
             local_ids: &self.local_ids,
             invocations: self.workgroup_size.iter().product(),

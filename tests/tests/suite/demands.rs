@@ -117,7 +117,13 @@ impl Screen {
                         "{specular} is mirrored by a roughness of {roughness} at {at:?}: {mirror:?}"
                     ));
                 }
-                let distance = self.near / f64::from(self.depth[index][0]);
+                let depth = f64::from(self.depth[index][0]);
+                let distance = if depth > 0.0 && depth.is_finite() {
+                    self.near / depth
+                } else {
+                    // No surface is there.
+                    f64::INFINITY
+                };
                 // Both are rounded to f32.
                 if distance < (1.0 - 1e-6) * f64::from(mirror.nearest) {
                     return Err(format!("a mirror at {distance} at {at:?}: {mirror:?}"));
@@ -300,6 +306,7 @@ fn images_hold_what_they_say_and_that_exactly() {
             let mirrors = screen.specular.iter().zip(&screen.depth);
             let depth = mirrors
                 .filter(|(texel, _)| texel[..3].iter().any(|&channel| channel > 0.0))
+                .filter(|(_, depth)| depth[0] > 0.0 && depth[0].is_finite())
                 .fold(0.0_f64, |most, (_, depth)| most.max(depth[0].into()));
             let exact = screen.near / depth;
             let nearest = f64::from(mirror.nearest);

@@ -47,11 +47,11 @@ pub struct CpuOptions {
     /// reads that nothing wrote also means that no two textures or buffers of a
     /// plan share memory.
     pub checks: Checks,
-    /// Whether the [sanitiser](crate::sanitise) follows compute passes; what it finds is
-    /// in [`CpuBackend::take_sanitised`]. Kernels then compute in
+    /// Whether the [sanitiser](crate::sanitise) follows what kernels compute; what it
+    /// finds is in [`CpuBackend::take_sanitised`]. Kernels then compute in
     /// [`NumberType::Shadow`] whatever `number_type` says, each from the `f32` that its
-    /// resources hold, so that results are bit by bit those of `f32`. Passes that draw
-    /// are not followed.
+    /// resources hold, so that results are bit by bit those of `f32`. Of passes that draw
+    /// it finds what their vertex and fragment kernels do.
     pub sanitise: bool,
     /// Whether results of compute passes can be moved within what WGSL allows, see
     /// [`CpuBackend::set_perturbation`].
@@ -165,8 +165,8 @@ impl CpuBackend {
         self.executor.set_perturbation(seed);
     }
 
-    /// What the sanitiser found in the compute passes since this was last asked, in the
-    /// order in which they ran; it grows with every frame until then.
+    /// What the sanitiser found in the passes since this was last asked, in the order in
+    /// which they ran; it grows with every frame until then.
     pub fn take_sanitised(&mut self) -> Vec<StepSanitised> {
         std::mem::take(&mut self.sanitised)
     }

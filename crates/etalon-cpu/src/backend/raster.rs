@@ -13,11 +13,12 @@ use etalon_core::raster::{VertexAttribute, VertexLayout};
 
 use super::histories::clear_texel;
 use super::resources::Resources;
-use super::{CpuBackend, malformed};
+use super::{CpuBackend, StepSanitised, malformed};
 use crate::error::RunError;
 use crate::program::locate_of;
 use crate::raster::{
-    DrawRange, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram, VertexBuffer,
+    DrawRange, DrawWatch, IndexBuffer, RasterDesc, RasterDraw, RasterError, RasterProgram,
+    VertexBuffer,
 };
 
 /// The programs of all draws, by what makes them.
@@ -69,7 +70,11 @@ fn failed(step: &str, error: RasterError) -> BackendError {
     }
 }
 
-fn translate(kernel: &Arc<Kernel>, form: &DrawForm) -> Result<RasterProgram, RasterError> {
+fn translate(
+    kernel: &Arc<Kernel>,
+    form: &DrawForm,
+    sanitise: bool,
+) -> Result<RasterProgram, RasterError> {
     let (vertex, fragment) = match kernel.raster() {
         Some(stages) => (
             stages.vertex.entry_point.as_str(),
@@ -87,6 +92,7 @@ fn translate(kernel: &Arc<Kernel>, form: &DrawForm) -> Result<RasterProgram, Ras
         state: &form.state,
         colours: &form.colours,
         depth: form.depth,
+        sanitise,
     };
     let name = kernel.name.clone();
     RasterProgram::new(
@@ -112,7 +118,8 @@ impl CpuBackend {
             if self.raster_programs.0.contains_key(&form) {
                 continue;
             }
-            let program = translate(kernel, &form).map_err(|error| failed(step, error))?;
+            let program =
+                translate(kernel, &form, self.sanitise).map_err(|error| failed(step, error))?;
             if !self
                 .raster_programs
                 .0
@@ -150,6 +157,8 @@ impl CpuBackend {
             .map(view)
             .collect::<Result<Vec<_>, _>>()?;
         let depth = raster.depth.as_ref().map(view).transpose()?;
+        // Of all draws of a form at once.
+        let mut watched: Vec<(DrawForm, DrawWatch)> = Vec::new();
         for draw in &raster.draws {
             let form = form(plan, name, raster, draw)?;
             let program = self.raster_programs.0.get(&form);
@@ -192,12 +201,32 @@ impl CpuBackend {
                     colours: &colours,
                     depth: depth.as_ref(),
                 };
-                let drawn = program.draw(&self.executor, &draw);
+                let at = watched.iter().position(|(known, _)| *known == form);
+                let at = at.unwrap_or_else(|| {
+                    watched.push((form.clone(), program.watch(&draw)));
+                    watched.len() - 1
+                });
+                let drawn = program.draw_watched(&self.executor, &draw, &watched[at].1);
                 drawn.map_err(|error| failed(name, error))?;
             }
             count += u64::from(!draw.extent.is_none());
         }
         self.counters.draws += count;
+        if self.sanitise {
+            for (form, watch) in watched {
+                let Some(program) = self.raster_programs.0.get(&form) else {
+                    continue;
+                };
+                let found = program.sanitised(watch);
+                for found in [found.vertices, found.fragments] {
+                    self.sanitised.push(StepSanitised {
+                        step: name.to_owned(),
+                        kernel: program.name().to_owned(),
+                        found,
+                    });
+                }
+            }
+        }
         Ok(())
     }
 }

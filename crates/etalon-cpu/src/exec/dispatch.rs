@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::check::{Checker, Collector, Shadow};
 use super::link::Linked;
-use super::probe::{Heat, Prober, Tally};
+use super::probe::{Heat, Prober, Tally, append_tallies};
 use super::profile::{Recorder, Recording, Unwatched, Watch};
 use super::state::{Failure, LocalIds, Resource, StageLanes, State};
 use super::subgroup::MAX_SUBGROUP;
@@ -420,6 +420,7 @@ impl<'a, N: Number> Job<'a, N> {
                 inputs: allocate(resources.stage.inputs.len().saturating_mul(chunks))?,
                 outputs: allocate(resources.stage.outputs.len().saturating_mul(chunks))?,
                 chunks,
+                ..StageLanes::default()
             },
             checker: Checker::new(self.code, chunks, self.shadows),
             prober: self
@@ -466,13 +467,7 @@ impl Found {
             .prober
             .map(|prober| prober.tallies)
             .unwrap_or_default();
-        if self.tallies.is_empty() {
-            self.tallies = tallies;
-        } else {
-            for (to, from) in self.tallies.iter_mut().zip(&tallies) {
-                to.append(from);
-            }
-        }
+        append_tallies(&mut self.tallies, tallies);
     }
 }
 

@@ -1,23 +1,98 @@
 //! Running vertex and fragment kernels: batches of lanes that others fill and read.
 
+use std::sync::{Mutex, PoisonError};
+
+use etalon_core::Format;
+
 use super::Executor;
 use super::dispatch::{DispatchFailure, Job};
 use super::isa::Isa;
 use super::link::{Instr, Linked};
+use super::links::Links;
 use super::memory::rounds;
+use super::probe::{Heat, StoreFormat, Tally, append_tallies};
 use super::profile::Unwatched;
-use super::state::{Failure, LocalIds, Resource, State};
+use super::state::{Failure, LocalIds, Resource, StageLanes, State};
 use super::tier::{Handler, Step, Tier, TieredStep};
 use crate::code::Code;
 use crate::ir::{Input, Op};
-use crate::num::Number;
+use crate::num::{Number, NumberType, Shadow};
 use crate::registers::LANES;
+
+/// A vertex or fragment kernel and what it is run with.
+#[derive(Clone, Copy)]
+pub(crate) struct StageKernel<'a> {
+    pub(crate) code: &'a Code,
+    pub(crate) links: &'a Links,
+    pub(crate) resources: &'a [Resource<'a>],
+    /// Of one workgroup of as many lanes as a batch has at most.
+    pub(crate) local_ids: &'a LocalIds,
+    /// What it is computed in; inputs and outputs are `f32` in every type.
+    pub(crate) number_type: NumberType,
+    /// Formats of the colours that it gives.
+    pub(crate) colours: &'a [Format],
+    /// Where its probes note what they see.
+    pub(crate) watch: &'a StageWatch,
+}
+
+/// What the probes of a kernel note.
+#[derive(Debug, Default)]
+pub(crate) struct StageWatch {
+    pub(crate) heat: Heat,
+    tallies: Mutex<Vec<Tally>>,
+}
+
+impl StageWatch {
+    pub(crate) fn new(heat: Heat) -> Self {
+        Self {
+            heat,
+            tallies: Mutex::default(),
+        }
+    }
+
+    pub(crate) fn into_tallies(self) -> (Vec<Tally>, Heat) {
+        let tallies = self.tallies.into_inner();
+        (tallies.unwrap_or_else(PoisonError::into_inner), self.heat)
+    }
+}
+
+/// Whose lanes those of a chunk are, for probes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Who {
+    /// A bit for each lane that has an invocation, not only a helper of one.
+    pub(crate) live: u64,
+    /// The pixel or the vertex, by number.
+    pub(crate) invocation: [u32; LANES],
+}
+
+impl Default for Who {
+    fn default() -> Self {
+        Self {
+            live: 0,
+            invocation: [0; LANES],
+        }
+    }
+}
 
 /// One worker's lanes of a vertex or fragment kernel.
 pub(crate) struct Stage<'a> {
-    state: State<'a, f32>,
-    linked: &'a Linked<f32>,
+    /// Given to the state only while it runs, so that whoever fills and reads lanes
+    /// need not know the number type.
+    lanes: StageLanes,
+    typed: Typed<'a>,
+    watch: &'a StageWatch,
     max_trips: u32,
+}
+
+enum Typed<'a> {
+    Singles(Box<Ready<'a, f32>>),
+    Doubles(Box<Ready<'a, f64>>),
+    Shadowed(Box<Ready<'a, Shadow>>),
+}
+
+struct Ready<'a, N: Number> {
+    state: State<'a, N>,
+    linked: &'a Linked<N>,
 }
 
 /// Why a batch cannot be run.
@@ -29,34 +104,92 @@ pub(crate) enum StageFailure {
     EndlessLoop(u32),
 }
 
-impl<'a> Stage<'a> {
-    /// Lanes for batches of up to so many chunks; `local_ids` are of one workgroup
-    /// of as many.
-    pub(crate) fn new(
-        code: &'a Code,
-        linked: &'a Linked<f32>,
-        resources: &'a [Resource<'a>],
-        local_ids: &'a LocalIds,
+impl<'a, N: Number> Ready<'a, N> {
+    fn new(
+        kernel: &StageKernel<'a>,
+        linked: &'a Linked<N>,
         executor: &Executor,
-    ) -> Result<Self, StageFailure> {
+    ) -> Result<(Box<Self>, StageLanes), StageFailure> {
         let job = Job {
-            code,
+            code: kernel.code,
             linked,
-            resources,
-            local_ids,
+            resources: kernel.resources,
+            local_ids: kernel.local_ids,
             invocations: 0,
             shadows: &[],
-            heat: None,
+            heat: Some(&kernel.watch.heat),
             workgroup_size: [0; 3],
             recording: None,
         };
-        let state = job.state(executor, local_ids.active.len(), [1; 3]);
+        let state = job.state(executor, kernel.local_ids.active.len(), [1; 3]);
+        let mut state = state.map_err(|failure| match failure {
+            DispatchFailure::OutOfMemory(bytes) => StageFailure::OutOfMemory(bytes),
+            _ => StageFailure::OutOfMemory(0),
+        })?;
+        let mut lanes = std::mem::take(&mut state.stage);
+        if state.prober.is_some() {
+            lanes.who = vec![Who::default(); lanes.chunks];
+            lanes.colours = kernel
+                .colours
+                .iter()
+                .copied()
+                .map(StoreFormat::of)
+                .collect();
+        }
+        Ok((Box::new(Self { state, linked }), lanes))
+    }
+
+    fn run(
+        &mut self,
+        lanes: &mut StageLanes,
+        chunks: usize,
+        max_trips: u32,
+    ) -> Result<(), StageFailure> {
+        let state = &mut self.state;
+        state.chunks = chunks.min(lanes.chunks);
+        std::mem::swap(&mut state.stage, lanes);
+        if let Some(prober) = &mut state.prober {
+            prober.begin();
+        }
+        let result = self.linked.run(state, max_trips, &mut Unwatched);
+        std::mem::swap(&mut state.stage, lanes);
+        result.map_err(|failure| match failure {
+            Failure::EndlessLoop { counter, .. } => StageFailure::EndlessLoop(counter),
+            // Validation lets no barriers into these stages.
+            Failure::DivergentBarrier { .. } => StageFailure::OutOfMemory(0),
+        })
+    }
+
+    fn into_tallies(self) -> Vec<Tally> {
+        self.state
+            .prober
+            .map(|prober| prober.tallies)
+            .unwrap_or_default()
+    }
+}
+
+impl<'a> Stage<'a> {
+    /// Lanes for batches of up to as many chunks as the kernel's `local_ids` have.
+    pub(crate) fn new(kernel: &StageKernel<'a>, executor: &Executor) -> Result<Self, StageFailure> {
+        let (code, links, tier) = (kernel.code, kernel.links, executor.tier());
+        let (typed, lanes) = match kernel.number_type {
+            NumberType::F32 => {
+                let (ready, lanes) = Ready::new(kernel, links.singles(code, tier), executor)?;
+                (Typed::Singles(ready), lanes)
+            }
+            NumberType::F64 => {
+                let (ready, lanes) = Ready::new(kernel, links.doubles(code, tier), executor)?;
+                (Typed::Doubles(ready), lanes)
+            }
+            NumberType::Shadow => {
+                let (ready, lanes) = Ready::new(kernel, links.shadowed(code, tier), executor)?;
+                (Typed::Shadowed(ready), lanes)
+            }
+        };
         Ok(Self {
-            state: state.map_err(|failure| match failure {
-                DispatchFailure::OutOfMemory(bytes) => StageFailure::OutOfMemory(bytes),
-                _ => StageFailure::OutOfMemory(0),
-            })?,
-            linked,
+            lanes,
+            typed,
+            watch: kernel.watch,
             max_trips: executor.max_trips(),
         })
     }
@@ -64,28 +197,42 @@ impl<'a> Stage<'a> {
     /// The lanes of an input, as bits.
     #[inline(always)]
     pub(crate) fn input(&mut self, slot: usize, chunk: usize) -> &mut [u32; LANES] {
-        let stage = &mut self.state.stage;
-        &mut stage.inputs[slot * stage.chunks + chunk].0
+        &mut self.lanes.inputs[slot * self.lanes.chunks + chunk].0
     }
 
     /// The lanes of an output, as bits.
     #[inline(always)]
     pub(crate) fn output(&self, slot: usize, chunk: usize) -> &[u32; LANES] {
-        let stage = &self.state.stage;
-        &stage.outputs[slot * stage.chunks + chunk].0
+        &self.lanes.outputs[slot * self.lanes.chunks + chunk].0
+    }
+
+    /// Whose a chunk's lanes are, to be filled if probes ask for it.
+    #[inline(always)]
+    pub(crate) fn who(&mut self, chunk: usize) -> Option<&mut Who> {
+        self.lanes.who.get_mut(chunk)
     }
 
     /// Runs the first chunks of the lanes.
     pub(crate) fn run(&mut self, chunks: usize) -> Result<(), StageFailure> {
-        self.state.chunks = chunks.min(self.state.stage.chunks);
-        let result = self
-            .linked
-            .run(&mut self.state, self.max_trips, &mut Unwatched);
-        result.map_err(|failure| match failure {
-            Failure::EndlessLoop { counter, .. } => StageFailure::EndlessLoop(counter),
-            // Validation lets no barriers into these stages.
-            Failure::DivergentBarrier { .. } => StageFailure::OutOfMemory(0),
-        })
+        let (lanes, max_trips) = (&mut self.lanes, self.max_trips);
+        match &mut self.typed {
+            Typed::Singles(ready) => ready.run(lanes, chunks, max_trips),
+            Typed::Doubles(ready) => ready.run(lanes, chunks, max_trips),
+            Typed::Shadowed(ready) => ready.run(lanes, chunks, max_trips),
+        }
+    }
+
+    /// Hands over what probes have noted.
+    pub(crate) fn finish(self) {
+        let tallies = match self.typed {
+            Typed::Singles(ready) => ready.into_tallies(),
+            Typed::Doubles(ready) => ready.into_tallies(),
+            Typed::Shadowed(ready) => ready.into_tallies(),
+        };
+        if !tallies.is_empty() {
+            let all = self.watch.tallies.lock();
+            append_tallies(&mut all.unwrap_or_else(PoisonError::into_inner), tallies);
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 use etalon_core::resource::SamplerDesc;
 
 use super::check::Checker;
-use super::probe::Prober;
+use super::probe::{Prober, StoreFormat};
+use super::stage::Who;
 use crate::code::{Code, CodeInst, Slot};
 use crate::memory::{Buffer, TextureView};
 use crate::num::Number;
@@ -79,6 +80,10 @@ pub(crate) struct StageLanes {
     pub(crate) outputs: Vec<Lanes<u32>>,
     /// Entries of each slot.
     pub(crate) chunks: usize,
+    /// By chunk; none without probes.
+    pub(crate) who: Vec<Who>,
+    /// Of the targets that colours are for; none without probes.
+    pub(crate) colours: Vec<StoreFormat>,
 }
 
 /// A worker's state.

@@ -11,6 +11,8 @@ pub(crate) enum Probed {
     Arith(Arith),
     /// A texel that is written. Operands: its four channels.
     Texel(ImageAccess),
+    /// What a fragment gives for a target. Operands: its channels.
+    Colour(u32),
     /// A word of a buffer that is written. Operand: the number.
     Word,
 }

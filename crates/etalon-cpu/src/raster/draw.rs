@@ -16,9 +16,9 @@ use super::setup::{Chunk, Region, Setup, TILE};
 use super::shade::{BatchLanes, Feed, Fill, QUADS, TILE_QUADS, apart};
 use super::tile::{EarlyTest, Scan};
 use super::vertex::{VertexRun, Vertices};
-use super::{DrawCounters, RasterDraw, RasterProgram, StageProgram};
+use super::{DrawCounters, DrawReport, DrawWatch, RasterDraw, RasterProgram, StageProgram};
 use crate::error::RunError;
-use crate::exec::{Executor, LocalIds, Resource, Stage, StageFailure, work};
+use crate::exec::{Executor, LocalIds, Resource, Stage, StageFailure, StageKernel, work};
 use crate::ir::{StageInput, StageOutput};
 use crate::memory::{Buffer, TextureView};
 use crate::program::{check_binding, note_written};
@@ -52,6 +52,9 @@ struct Shared<'a> {
     local_ids: &'a LocalIds,
     /// Whether no two fragments of a pixel may be in a batch.
     apart: bool,
+    /// Of the targets.
+    width: u32,
+    watch: &'a DrawWatch,
 }
 
 impl RasterProgram {
@@ -67,6 +70,21 @@ impl RasterProgram {
         &self,
         executor: &Executor,
         draw: &RasterDraw<'_>,
+    ) -> Result<DrawReport, RasterError> {
+        let watch = self.watch(draw);
+        let counters = self.draw_watched(executor, draw, &watch)?;
+        Ok(DrawReport {
+            counters,
+            sanitised: self.sanitised(watch),
+        })
+    }
+
+    /// [`RasterProgram::draw`], of several draws to the same targets.
+    pub(crate) fn draw_watched(
+        &self,
+        executor: &Executor,
+        draw: &RasterDraw<'_>,
+        watch: &DrawWatch,
     ) -> Result<DrawCounters, RasterError> {
         let (width, height) = self.check_targets(draw)?;
         self.check_ranges(draw)?;
@@ -95,7 +113,16 @@ impl RasterProgram {
         let region = region(draw);
         let assembly = self.assemble(draw)?;
         if !region.is_empty() && assembly.triangles() > 0 && draw.range.instances > 0 {
-            self.draw_instances(executor, draw, &resources, region, &assembly, &mut counters)?;
+            let shape = (region, width);
+            self.draw_instances(
+                executor,
+                draw,
+                &resources,
+                shape,
+                &assembly,
+                watch,
+                &mut counters,
+            )?;
         }
         note_written(&self.bindings, draw.resources);
         for view in draw.colours.iter().chain(draw.depth) {
@@ -264,8 +291,9 @@ impl RasterProgram {
         executor: &Executor,
         draw: &RasterDraw<'_>,
         resources: &[Resource<'_>],
-        region: Region,
+        (region, width): (Region, u32),
         assembly: &Assembly,
+        watch: &DrawWatch,
         counters: &mut DrawCounters,
     ) -> Result<(), RasterError> {
         let map = ViewportMap::new(&draw.viewport);
@@ -284,6 +312,8 @@ impl RasterProgram {
             local_ids: &local_ids,
             apart: self.tests().late.is_some()
                 || targets.iter().any(|target| target.state.blend.is_some()),
+            width,
+            watch,
         };
         let run = VertexRun {
             executor,
@@ -292,6 +322,7 @@ impl RasterProgram {
             range: draw.range,
             assembly,
             map: &map,
+            watch: &watch.vertices,
         };
         let each = assembly.vertices().max(1);
         if each > i32::MAX as usize {
@@ -458,6 +489,9 @@ impl RasterProgram {
                     }
                 }
             }
+            if let Some(stage) = worker.and_then(|worker| worker.stage) {
+                stage.finish();
+            }
         });
         match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => match &self.fragment {
@@ -500,10 +534,16 @@ impl RasterProgram {
         let lanes = shared.executor.stage_lanes() as usize;
         let stage = match &self.fragment {
             Some(fragment) => {
-                let linked = fragment.linked(shared.executor.tier());
-                let (code, ids) = (&fragment.code, shared.local_ids);
-                let executor = shared.executor;
-                Some(Stage::new(code, linked, shared.resources, ids, executor)?)
+                let kernel = StageKernel {
+                    code: &fragment.code,
+                    links: &fragment.links,
+                    resources: shared.resources,
+                    local_ids: shared.local_ids,
+                    number_type: shared.executor.number_type(),
+                    colours: &self.colours,
+                    watch: &shared.watch.fragments,
+                };
+                Some(Stage::new(&kernel, shared.executor)?)
             }
             None => None,
         };
@@ -661,6 +701,7 @@ impl TileWorker<'_> {
             planes: &mut self.planes,
             wants_depth: shared.tests.late.is_some(),
             fixed: self.fixed,
+            width: shared.width,
         };
         work(tier, &mut fill);
         if let Some(stage) = &mut self.stage {

@@ -16,9 +16,13 @@
 //! blending are `f32`; [`planes`] says in which order they are computed, and why.
 //! Results have the same bits at any number of threads and on every [`Tier`].
 //!
-//! What is drawn is always computed in `f32`, whatever the executor's
-//! [number type](crate::NumberType): a wide plane of a target gets the values of its
-//! texels. [Checks](crate::Checks) and profiles do not watch these kernels.
+//! Where triangles are is computed in `f32`, whatever the executor's
+//! [number type](crate::NumberType), or another type would see other pixels covered:
+//! so are vertex kernels, and what is interpolated. Fragment kernels compute in the
+//! number type, from `f32` inputs, and give the nearest `f32` to blending and stores: a
+//! wide plane of a target gets the values of its texels. The
+//! [sanitiser](crate::sanitise) follows both kernels; [checks](crate::Checks) and
+//! profiles do not watch them.
 
 // Loops over lanes are by index, as in `exec`: what they compile to is what counts.
 #![allow(clippy::needless_range_loop)]
@@ -35,9 +39,9 @@ mod setup;
 mod shade;
 mod tile;
 mod vertex;
+mod watch;
 
 use std::fmt;
-use std::sync::OnceLock;
 
 use etalon_core::Format;
 use etalon_core::format::{Encoding, SampleKind};
@@ -49,12 +53,14 @@ use naga::valid::ModuleInfo;
 use naga::{Module, ShaderStage, Span};
 
 pub use error::RasterError;
+pub(crate) use watch::DrawWatch;
+pub use watch::{DrawReport, DrawSanitised};
 
 use self::interface::Feeds;
 use crate::binding::BindingInfo;
 use crate::code::Code;
 use crate::error::{Location, RunError, TranslateError};
-use crate::exec::{Linked, Tier};
+use crate::exec::Links;
 use crate::ir::{Input, Op, StageInput, StageOutput};
 use crate::lower;
 use crate::memory::{Buffer, TextureView};
@@ -77,6 +83,9 @@ pub struct RasterDesc<'a> {
     pub colours: &'a [Format],
     /// Format of the depth target: Depth32Float or Depth16Unorm.
     pub depth: Option<Format>,
+    /// Whether the [sanitiser](crate::sanitise) follows what the kernels compute, in
+    /// draws of [`NumberType::Shadow`](crate::NumberType::Shadow).
+    pub sanitise: bool,
 }
 
 /// Two kernels that draw triangles, as bytecode.
@@ -114,7 +123,7 @@ type Locate = Box<dyn Fn(Span) -> Location + Send + Sync>;
 /// A kernel of one stage.
 struct StageProgram {
     code: Code,
-    linked: [OnceLock<Linked<f32>>; Tier::ALL.len()],
+    links: Links,
     /// Slots of the inputs that the code reads.
     inputs: Vec<(usize, StageInput)>,
     /// Whether it writes memory.
@@ -137,14 +146,10 @@ impl StageProgram {
         let writes = code.insts.iter().any(|inst| is_write(inst.op));
         Self {
             code,
-            linked: Default::default(),
+            links: Links::default(),
             inputs,
             writes,
         }
-    }
-
-    fn linked(&self, tier: Tier) -> &Linked<f32> {
-        self.linked[tier as usize].get_or_init(|| Linked::new(&self.code, tier))
     }
 
     fn output(&self, output: StageOutput) -> Option<usize> {
@@ -289,7 +294,10 @@ impl RasterProgram {
             interface::check_varyings(&name, module, function(vertex), function(fragment))?;
         }
         check_targets(&name, module, fragment.map(function), desc)?;
-        let options = TranslateOptions::default();
+        let options = TranslateOptions {
+            sanitise: desc.sanitise,
+            ..TranslateOptions::default()
+        };
         let translate = |entry: usize, other: Option<usize>, kind: StageKind<'_>| {
             let others: Vec<usize> = other.into_iter().collect();
             translate::translate_stage(module, info, entry, &others, kind, &options)

@@ -44,6 +44,8 @@ pub(super) struct Fill<'a, 's> {
     pub(super) wants_depth: bool,
     /// Depth16Unorm.
     pub(super) fixed: bool,
+    /// Of the targets.
+    pub(super) width: u32,
 }
 
 impl Work for Fill<'_, '_> {
@@ -123,6 +125,13 @@ impl Work for Fill<'_, '_> {
             let Some(stage) = &mut self.stage else {
                 continue;
             };
+            if let Some(who) = stage.who(number) {
+                who.live = who.live & !(0xf << lane) | u64::from(quad.mask & 0xf) << lane;
+                for k in 0..4 {
+                    let (column, row) = (u32::from(quad.x) + k % 2, u32::from(quad.y) + k / 2);
+                    who.invocation[lane + k as usize] = row * self.width + column;
+                }
+            }
             let mut varying = 0;
             for &(slot, feed) in self.feeds {
                 let lanes = stage.input(slot, number);

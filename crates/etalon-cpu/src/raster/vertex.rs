@@ -11,10 +11,13 @@ use super::indices::Assembly;
 use super::interface::Attribute;
 use super::planes::ViewportMap;
 use super::{DrawRange, RasterProgram, VertexBuffer};
-use crate::exec::{Executor, Fused, Isa, LocalIds, Resource, Stage, StageFailure, Work, work};
+use crate::exec::{
+    Executor, Fused, Isa, LocalIds, Resource, Stage, StageFailure, StageKernel, StageWatch, Work,
+    work,
+};
 use crate::ir::{StageInput, StageOutput};
 use crate::memory::unorm8;
-use crate::num::f16_to_f32;
+use crate::num::{NumberType, f16_to_f32};
 use crate::registers::LANES;
 
 /// Words of a vertex before its varyings: the position in clip space, the corner in
@@ -44,6 +47,7 @@ pub(super) struct VertexRun<'a> {
     pub(super) range: DrawRange,
     pub(super) assembly: &'a Assembly,
     pub(super) map: &'a ViewportMap,
+    pub(super) watch: &'a StageWatch,
 }
 
 impl RasterProgram {
@@ -109,6 +113,9 @@ impl RasterProgram {
                     return;
                 }
             }
+            if let Some(worker) = worker {
+                worker.stage.finish();
+            }
         });
         match failure.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(error) => Err(self.stage_error(&self.vertex, error, run.executor)),
@@ -121,11 +128,22 @@ impl RasterProgram {
         run: &'a VertexRun<'a>,
         local_ids: &'a LocalIds,
     ) -> Result<Worker<'a>, StageFailure> {
-        let code = &self.vertex.code;
-        let linked = self.vertex.linked(run.executor.tier());
+        let kernel = StageKernel {
+            code: &self.vertex.code,
+            links: &self.vertex.links,
+            resources: run.resources,
+            local_ids,
+            number_type: match run.executor.number_type() {
+                // Positions of another type would cover other pixels.
+                NumberType::F64 => NumberType::F32,
+                other => other,
+            },
+            colours: &[],
+            watch: run.watch,
+        };
         let position = |axis| self.vertex.output(StageOutput::Position(axis));
         Ok(Worker {
-            stage: Stage::new(code, linked, run.resources, local_ids, run.executor)?,
+            stage: Stage::new(&kernel, run.executor)?,
             run,
             inputs: &self.vertex.inputs,
             attributes: &self.feeds.attributes,
@@ -176,6 +194,14 @@ impl Worker<'_> {
                         .map_or(0, |index| index.wrapping_add_signed(range.base_vertex)),
                     None => range.first.wrapping_add(slot as u32),
                 };
+            }
+            if let Some(who) = self.stage.who(chunk) {
+                let left = (count - chunk * LANES).min(LANES);
+                who.live = u64::MAX >> (LANES - left);
+                for k in 0..LANES {
+                    let at = first + chunk * LANES + k;
+                    who.invocation[k] = (first_instance as usize * each + at) as u32;
+                }
             }
             for &(slot, input) in self.inputs {
                 let lanes = self.stage.input(slot, chunk);

@@ -29,6 +29,8 @@ mod gather;
 
 use std::fmt;
 
+pub(crate) use gather::Probes;
+
 use crate::error::Location;
 
 /// Relative error that shows in a picture of 16-bit floats: a unit in the last of
@@ -50,14 +52,15 @@ pub enum Role {
     Comparison,
     /// Rounding to an integer, of either kind of number.
     Index,
-    /// A texel or word that is written.
+    /// A texel or word that is written, or the colour that a fragment gives.
     Store,
 }
 
 /// A number of an invocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Worst {
-    /// `global_invocation_id`.
+    /// `global_invocation_id`; of fragments the pixel, of vertices their number among
+    /// those that a draw gives to the kernel, instance by instance.
     pub invocation: [u32; 3],
     /// What was computed.
     pub value: f32,
@@ -150,7 +153,8 @@ pub struct Sanitised {
     /// In the order of the source. The same at any number of threads and lanes and on
     /// any instruction set.
     pub sites: Vec<Site>,
-    /// Invocations along x and, those of y and z together, y.
+    /// Invocations along x and, those of y and z together, y; of fragments the size of
+    /// the targets, of vertices 0.
     pub grid: [u32; 2],
     /// Which invocations have decided otherwise than their twins at some time, by
     /// place in the grid. Empty if there is no room.

@@ -9,7 +9,9 @@ use naga::{BuiltIn, DerivativeAxis, DerivativeControl, Expression, Handle, TypeI
 
 use super::layout::{class_of, is_half};
 use super::{Fail, Frame, Translator};
-use crate::ir::{Arith, Class, Input, Interpolation, Op, StageInput, StageOutput, Value, Variable};
+use crate::ir::{
+    Arith, Class, Input, Interpolation, Op, Probed, StageInput, StageOutput, Value, Variable,
+};
 
 /// What kind of kernel is translated.
 #[derive(Clone, Copy, Debug, Default)]
@@ -144,10 +146,22 @@ impl<'a> Translator<'a> {
                 (binding, ty) => self.outputs_of(ty, binding.as_ref(), &mut leaves)?,
             }
         }
+        let mut colours: Vec<(u32, Vec<Value>)> = Vec::new();
         for (leaf, &variable) in leaves.into_iter().zip(&frame.result) {
             if let Some(output) = leaf {
                 let value = self.builder.get(variable);
                 self.give(output, value);
+                if let StageOutput::Colour { target, .. } = output {
+                    match colours.last_mut() {
+                        Some((last, channels)) if *last == target => channels.push(value),
+                        _ => colours.push((target, vec![value])),
+                    }
+                }
+            }
+        }
+        if self.builder.instrument.probes {
+            for (target, channels) in colours {
+                self.where_alive(|this| this.builder.probe(Probed::Colour(target), &channels));
             }
         }
         if let Some(alive) = self.stage.alive

@@ -77,14 +77,12 @@ impl Frame {
         let mut places = depths.into_iter();
         each(&self.specular, |x, y, [r, g, b, shininess]| {
             let specular = r.max(g).max(b);
-            let own = places.next().unwrap_or(f32::INFINITY);
+            let own = places.next().unwrap_or(0.0);
             if specular > 0.0 {
-                // What is no number is as near as can be.
-                depth = if own >= 0.0 {
-                    depth.max(own)
-                } else {
-                    f32::INFINITY
-                };
+                // Other depths are of no surface, see `distance_of` in lib/camera.
+                if own > 0.0 && own.is_finite() {
+                    depth = depth.max(own);
+                }
                 mirrors.add(x, y);
                 let roughness = 1.0 - shininess;
                 smoothest = smoothest.min(roughness);

@@ -18,6 +18,7 @@
 //! their format each. Sums of non-negative values with non-negative weights keep
 //! relative errors as they are, so these add up and do not grow.
 
+use etalon_core::Format;
 use etalon_core::image::ImageData;
 use serde::{Deserialize, Serialize};
 
@@ -190,6 +191,37 @@ impl Gathering {
         }
     }
 
+    /// Takes what a frame's passes that draw stored in `f32`, and what they stored where
+    /// fragments compute in `f64`, both rounded to the format.
+    ///
+    /// Errors are relative to the largest channel of a texel: what is drawn are colours
+    /// and directions, of which a channel next to 0 shows nothing.
+    pub fn look_at_drawn(&mut self, frame: usize, singles: &[Store], doubles: &[Store]) {
+        for (single, double) in singles.iter().zip(doubles) {
+            let (Some(image), Some(exact)) = (&single.image, &double.wide) else {
+                continue;
+            };
+            let format = image.desc.format;
+            let bytes = image.bytes.chunks_exact(format.texel_bytes() as usize);
+            for (index, (bytes, exact)) in bytes.zip(exact).enumerate() {
+                self.found.texels += 1;
+                let stored = format.decode(bytes).to_f64();
+                let (error, channel) = drawn_error(format, &stored, exact);
+                self.errors.push(error as f32);
+                if error > self.bound {
+                    self.found.beyond += 1;
+                }
+                if error / self.bound > self.found.strain() {
+                    self.found.max = error;
+                    self.found.allowed = self.bound;
+                    self.found.at = single.place(frame, index, channel);
+                    self.found.stored = stored[channel];
+                    self.found.exact = exact[channel];
+                }
+            }
+        }
+    }
+
     /// What was found; `None` if nothing was looked at.
     #[must_use]
     pub fn finish(mut self) -> Option<Rounding> {
@@ -199,6 +231,33 @@ impl Gathering {
         self.found.p999 = f64::from(*p999);
         Some(self.found)
     }
+}
+
+/// The largest difference of a texel's channels beyond a step of the format, relative to
+/// the largest of them, and which it is.
+fn drawn_error(format: Format, stored: &[f64; 4], exact: &[f64; 4]) -> (f64, usize) {
+    let channels = format.channels() as usize;
+    let mut scale = scale::least(format);
+    for channel in 0..channels {
+        scale = scale.max(exact[channel].abs()).max(stored[channel].abs());
+    }
+    let mut worst = (0.0, 0);
+    for channel in 0..channels {
+        let (stored, value) = (stored[channel], exact[channel]);
+        let step = 2.0 * half_step(format, channel, value.abs().max(stored.abs()));
+        let distance = (stored - value).abs();
+        let error = if stored.to_bits() == value.to_bits() {
+            0.0
+        } else if distance.is_finite() {
+            (distance - step).max(0.0) / scale
+        } else {
+            f64::INFINITY
+        };
+        if error > worst.0 {
+            worst = (error, channel);
+        }
+    }
+    worst
 }
 
 /// Whether two `f64` runs have taken different decisions, here or in what was read:

@@ -84,6 +84,17 @@ impl Place<'_> {
     }
 }
 
+/// Magnitudes below this say nothing in a format: its least normal number, and of fixed
+/// point all.
+#[must_use]
+pub fn least(format: Format) -> f64 {
+    match format.encoding() {
+        Encoding::Float if half_step(format, 0, 1.0) < 1e-6 => f64::from(f32::MIN_POSITIVE),
+        Encoding::Float | Encoding::Ufloat | Encoding::SharedExponent => LEAST_NORMAL_HALF,
+        _ => 1.0,
+    }
+}
+
 /// Half the distance of a format's neighbouring numbers at `value`: how far rounding
 /// to nearest moves it.
 #[must_use]

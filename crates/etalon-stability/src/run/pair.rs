@@ -126,10 +126,11 @@ impl Pair<'_> {
             if executor.kind.is_costly() && !self.followed {
                 continue;
             }
-            // What is drawn is computed in f32, whatever the interpreter's number, and
-            // nobody looks into its kernels.
+            // What is drawn is stored in `f32` whatever it was computed in, so that the
+            // shadow has nothing to say that the sanitiser has not seen; and another
+            // device may cover other pixels, which is nothing of a spread.
             if self.effect.drawing() != Drawing::None
-                && !(executor.kind == Kind::Cpu || executor.kind.is_device())
+                && matches!(executor.kind, Kind::Shadow | Kind::Perturbed)
             {
                 continue;
             }
@@ -204,7 +205,16 @@ impl Pair<'_> {
                     result.digest = Some(digest(&frames));
                     kept.reference = frames;
                 }
-                Kind::Double => kept.double.push((arithmetic, frames)),
+                Kind::Double => {
+                    if self.effect.drawing() != Drawing::None {
+                        let pairs = kept.reference.iter().zip(&frames);
+                        for (number, (single, double)) in pairs.enumerate() {
+                            errors.look_at_drawn(number, single, double);
+                        }
+                        result.rounding = errors.clone().finish();
+                    }
+                    kept.double.push((arithmetic, frames));
+                }
                 Kind::Shadow => {
                     let double = kept.double(arithmetic);
                     for (number, stores) in frames.iter().enumerate() {

@@ -8,7 +8,8 @@ mod twin;
 mod value;
 
 pub(crate) use heat::Heat;
-pub(crate) use tally::Tally;
+pub(crate) use store::Format as StoreFormat;
+pub(crate) use tally::{Tally, append_tallies};
 pub(super) use twin::Twin;
 
 use super::link::Instr;
@@ -44,7 +45,7 @@ impl<'a> Prober<'a> {
         }
         let twin = |probed| match probed {
             Probed::Arith(op) => Some(Twin::of(op)),
-            Probed::Texel(_) | Probed::Word => None,
+            Probed::Texel(_) | Probed::Colour(_) | Probed::Word => None,
         };
         Some(Box::new(Self {
             tallies: vec![Tally::default(); probes.len()],
@@ -234,12 +235,21 @@ impl Prober<'_> {
                 let format = store::texture_format(state, access.image);
                 store::see(tally, format, scalars, who)
             }
+            (Probed::Colour(target), _) => {
+                let format = state.stage.colours.get(target as usize);
+                let format = format.copied().unwrap_or(store::Format::WORD);
+                store::see(tally, format, scalars, who)
+            }
             _ => store::see(tally, store::Format::WORD, scalars, who),
         }
     }
 
-    /// The place of an invocation in the dispatch, x first.
+    /// The place of an invocation in the dispatch, x first; the number of a pixel or
+    /// vertex.
     fn invocation<N: Number>(&self, state: &State<'_, N>, chunk: usize, lane: usize) -> u64 {
+        if let Some(who) = state.stage.who.get(chunk) {
+            return who.invocation[lane].into();
+        }
         let local = state.local_chunk(chunk);
         let mut workgroup = state.workgroup;
         workgroup[0] += state.group_in_batch(chunk);
@@ -270,7 +280,10 @@ fn active<N: Number>(state: &State<'_, N>, inst: &CodeInst, chunk: usize) -> u64
     for lane in 0..LANES {
         active |= u64::from(mask[lane] & there[lane] != 0) << lane;
     }
-    active
+    match state.stage.who.get(chunk) {
+        Some(who) => active & who.live,
+        None => active,
+    }
 }
 
 /// The unit in the last place of an `f32` that is nearest to `exact`.

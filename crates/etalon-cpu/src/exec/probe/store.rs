@@ -32,7 +32,7 @@ impl Format {
         floor: 1.0 / 2_097_152.0,
     };
 
-    fn of(format: TexelFormat) -> Self {
+    pub(crate) fn of(format: TexelFormat) -> Self {
         use TexelFormat as F;
         let floats = |largest, least| Self {
             channels: format.channels() as usize,

@@ -163,6 +163,17 @@ impl Tally {
     }
 }
 
+/// Adds what another worker noted of the same sites.
+pub(crate) fn append_tallies(all: &mut Vec<Tally>, more: Vec<Tally>) {
+    if all.is_empty() {
+        *all = more;
+    } else {
+        for (to, from) in all.iter_mut().zip(&more) {
+            to.append(from);
+        }
+    }
+}
+
 /// Twice the logarithm of a positive number, rounded down.
 #[inline]
 fn half_octaves(value: f64) -> i32 {

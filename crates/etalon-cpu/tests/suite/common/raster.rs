@@ -24,6 +24,7 @@ pub(crate) struct Scene<'a> {
     pub(crate) scissor: Option<Scissor>,
     pub(crate) clear: Texel,
     pub(crate) clear_depth: f32,
+    pub(crate) sanitise: bool,
 }
 
 /// Draws positions in clip space, with varyings from the same buffer.
@@ -51,6 +52,7 @@ impl<'a> Scene<'a> {
             scissor: None,
             clear: Texel::Float([0.0; 4]),
             clear_depth: 1.0,
+            sanitise: false,
         }
     }
 
@@ -74,6 +76,7 @@ impl<'a> Scene<'a> {
             state: &self.state,
             colours: &self.colours,
             depth: self.depth,
+            sanitise: self.sanitise,
         };
         RasterProgram::from_module("test", self.wgsl, &module, &info, &desc)
     }
@@ -109,7 +112,7 @@ impl<'a> Scene<'a> {
         executor: &Executor,
         targets: &Targets,
         resources: &[BoundResource<'_>],
-    ) -> Result<etalon_cpu::DrawCounters, RasterError> {
+    ) -> Result<etalon_cpu::DrawReport, RasterError> {
         let [width, height] = self.size;
         let buffers: Vec<VertexBuffer<'_>> = self
             .vertices

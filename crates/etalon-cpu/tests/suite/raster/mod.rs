@@ -6,3 +6,4 @@ mod interpolation;
 mod kernels;
 mod output;
 mod robust;
+mod sanitise;

@@ -1,5 +1,7 @@
 //! What is run on what.
 
+use std::sync::Arc;
+
 use etalon_core::backend::Inputs;
 use etalon_core::image::ImageData;
 use etalon_effects::EffectEntry;
@@ -79,6 +81,13 @@ impl Scene {
         match self {
             Self::Images(step) => step.frame.inputs(),
             Self::Stage(stage) => stage.inputs(),
+        }
+    }
+
+    /// Hands it what it else makes in every frame.
+    pub fn give_mirroring(&mut self, table: &Arc<ImageData>) {
+        if let Self::Stage(stage) = self {
+            stage.give_mirroring(table);
         }
     }
 

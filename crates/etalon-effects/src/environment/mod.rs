@@ -190,8 +190,9 @@ impl Surroundings {
         }
     }
 
-    /// Whether light comes from them.
-    pub(crate) fn shine(&self) -> bool {
+    /// Whether light comes from them: only then a table of [`mirroring`] is read.
+    #[must_use]
+    pub fn shine(&self) -> bool {
         self.environment.is_some() || self.above != Vec3::ZERO || self.below != Vec3::ZERO
     }
 

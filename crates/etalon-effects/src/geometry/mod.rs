@@ -104,11 +104,12 @@ pub fn prepass(
         ["drawn velocity", "velocity"].map(|name| geometry.target(graph, name, Format::Rg16Float));
     let texel = Vec2::new(geometry.size[0] as f32, geometry.size[1] as f32).recip();
     let draws = geometry.draws(|item| {
-        let previous = geometry.view.previous * item.previous;
+        // The difference in f64: of two matrices in f32 little would be left.
+        let change = geometry.view.previous * item.previous - geometry.view.view * item.world;
         let draw = geometry.placed(item, "geometry/velocity", None);
         item.surface
             .cut(draw)
-            .set("previous_world_view", previous.as_mat4())
+            .set("change", change.as_mat4())
             .set("texel", texel)
             .constant("MOVES", f64::from(item.class != DrawClass::Static))
     });
@@ -128,10 +129,7 @@ pub fn prepass(
         .elements(0..3)
         .read("depth", depth)
         .read("drawn", drawn)
-        .set(
-            "to_previous",
-            geometry.view.previous_from_current().as_mat4(),
-        )
+        .set("change", geometry.view.change().as_mat4())
         .set("projection_scale", camera.scale)
         .set("projection_centre", camera.centre)
         .set("depth_bias_slope", camera.depth_bias_slope())

@@ -33,9 +33,10 @@ impl View {
         Ok(())
     }
 
-    /// From view space to that of one frame earlier.
-    pub(super) fn previous_from_current(&self) -> DMat4 {
-        self.previous * self.view.inverse()
+    /// What is added to a point in view space to have it in that of one frame earlier.
+    /// The difference comes first: where the camera stands still it is 0.
+    pub(super) fn change(&self) -> DMat4 {
+        (self.previous - self.view) * self.view.inverse()
     }
 
     /// Turns normals of something in the world into view space: the inverse

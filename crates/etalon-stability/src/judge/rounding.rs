@@ -192,11 +192,19 @@ impl Gathering {
     }
 
     /// Takes what a frame's passes that draw stored in `f32`, and what they stored where
-    /// fragments compute in `f64`, both rounded to the format.
+    /// fragments compute in `f64`, both rounded to the format, and once more for each of
+    /// the `layers` that a target blends.
     ///
     /// Errors are relative to the largest channel of a texel: what is drawn are colours
     /// and directions, of which a channel next to 0 shows nothing.
-    pub fn look_at_drawn(&mut self, frame: usize, singles: &[Store], doubles: &[Store]) {
+    pub fn look_at_drawn(
+        &mut self,
+        frame: usize,
+        singles: &[Store],
+        doubles: &[Store],
+        layers: u32,
+    ) {
+        let steps = 2.0 * f64::from(1 + layers);
         for (single, double) in singles.iter().zip(doubles) {
             let (Some(image), Some(exact)) = (&single.image, &double.wide) else {
                 continue;
@@ -206,7 +214,7 @@ impl Gathering {
             for (index, (bytes, exact)) in bytes.zip(exact).enumerate() {
                 self.found.texels += 1;
                 let stored = format.decode(bytes).to_f64();
-                let (error, channel) = drawn_error(format, &stored, exact);
+                let (error, channel) = drawn_error(format, &stored, exact, steps);
                 self.errors.push(error as f32);
                 if error > self.bound {
                     self.found.beyond += 1;
@@ -233,9 +241,9 @@ impl Gathering {
     }
 }
 
-/// The largest difference of a texel's channels beyond a step of the format, relative to
-/// the largest of them, and which it is.
-fn drawn_error(format: Format, stored: &[f64; 4], exact: &[f64; 4]) -> (f64, usize) {
+/// The largest difference of a texel's channels beyond so many half steps of the format,
+/// relative to the largest of them, and which it is.
+fn drawn_error(format: Format, stored: &[f64; 4], exact: &[f64; 4], steps: f64) -> (f64, usize) {
     let channels = format.channels() as usize;
     let mut scale = scale::least(format);
     for channel in 0..channels {
@@ -244,9 +252,9 @@ fn drawn_error(format: Format, stored: &[f64; 4], exact: &[f64; 4]) -> (f64, usi
     let mut worst = (0.0, 0);
     for channel in 0..channels {
         let (stored, value) = (stored[channel], exact[channel]);
-        let step = 2.0 * half_step(format, channel, value.abs().max(stored.abs()));
+        let step = steps * half_step(format, channel, value.abs().max(stored.abs()));
         let distance = (stored - value).abs();
-        let error = if stored.to_bits() == value.to_bits() {
+        let error = if stored == value || stored.is_nan() && value.is_nan() {
             0.0
         } else if distance.is_finite() {
             (distance - step).max(0.0) / scale
@@ -291,4 +299,63 @@ fn texel_error(
         }
     }
     worst
+}
+
+#[cfg(test)]
+mod tests {
+    use etalon_core::resource::TextureDesc;
+    use etalon_core::texel::Texel;
+
+    use super::*;
+
+    /// A texel of halves beside others, and what `f64` has of it.
+    fn found(stored: [f32; 4], exact: [f64; 4], layers: u32) -> Rounding {
+        let format = Format::Rgba16Float;
+        let mut bytes = vec![0; 16];
+        format.encode(Texel::Float([1.0; 4]), &mut bytes[..8]);
+        format.encode(Texel::Float(stored), &mut bytes[8..]);
+        let single = Store {
+            image: Some(ImageData {
+                desc: TextureDesc::d2(2, 1, format),
+                bytes,
+            }),
+            ..Store::default()
+        };
+        let double = Store {
+            wide: Some(vec![[1.0; 4], exact]),
+            ..single.clone()
+        };
+        let mut errors = Gathering::new(None, false);
+        errors.look_at_drawn(0, &[single], &[double], layers);
+        errors.finish().unwrap()
+    }
+
+    #[test]
+    fn what_is_drawn_may_be_off_by_what_stores_round() {
+        let step = 1.0 / 1024.0;
+        let [one, two, many] = [1.0, 2.0, 5.0].map(|steps| 1.0 + steps * step);
+        let stored = [1.0, 0.5, 0.0, 1.0];
+        assert_eq!(found(stored, [one, 0.5, 0.0, 1.0], 0).max, 0.0);
+        let off = found(stored, [two, 0.5, 0.0, 1.0], 0);
+        assert_eq!((off.beyond, off.at.x, off.at.channel), (1, 1, 0));
+        assert!((off.max - step / two).abs() < 1e-9);
+        // Two layers round twice more each.
+        assert_eq!(found(stored, [two, 0.5, 0.0, 1.0], 2).beyond, 0);
+        assert_eq!(found(stored, [many, 0.5, 0.0, 1.0], 2).beyond, 1);
+    }
+
+    #[test]
+    fn a_channel_next_to_nothing_counts_relative_to_the_largest() {
+        let stored = [1.0, 0.0, 0.0, 1.0];
+        assert_eq!(found(stored, [1.0, 1e-4, 0.0, 1.0], 0).beyond, 0);
+        assert_eq!(found(stored, [1.0, 1e-2, 0.0, 1.0], 0).beyond, 1);
+    }
+
+    #[test]
+    fn what_is_no_number_is_off_unless_both_are() {
+        let nan = f64::NAN;
+        assert_eq!(found([1.0; 4], [nan, 1.0, 1.0, 1.0], 0).max, f64::INFINITY);
+        let both = found([f32::NAN, 1.0, 1.0, 1.0], [nan, 1.0, 1.0, 1.0], 0);
+        assert_eq!(both.beyond, 0);
+    }
 }

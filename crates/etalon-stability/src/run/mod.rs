@@ -2,6 +2,7 @@
 
 mod conclude;
 mod pair;
+mod table;
 
 use etalon_core::backend::BackendError;
 use etalon_scenes::cases::case;
@@ -15,9 +16,11 @@ use crate::model::{ExecutorInfo, Report};
 use crate::plant::Plant;
 use crate::sanitise::{AllowError, Watch};
 use crate::scene::Effect;
-use crate::subject::{Subject, SubjectError, subjects};
+use crate::subject::{Frames, Subject, SubjectError, subjects};
 pub(crate) use conclude::conclusions;
 use pair::Pair;
+pub use table::TableError;
+use table::table_of_mirroring;
 
 /// Default of [`Options::followed`].
 pub const FOLLOWED: usize = 2048;
@@ -101,6 +104,9 @@ pub enum RunError {
     /// A line of the table of exceptions cannot be understood.
     #[error(transparent)]
     Exception(#[from] BadLine),
+    /// What all cases that are lit share cannot be made.
+    #[error("the table of what surfaces mirror cannot be made: {0}")]
+    Table(#[from] TableError),
     /// An executor that `ETALON_REQUIRE` names is not there.
     #[error("{name} is required: {source}")]
     Required {
@@ -127,9 +133,19 @@ pub fn run(options: &Options, progress: &mut dyn Progress) -> Result<Report, Run
     for (path, text) in &options.kernels {
         kernels.add_source(path, text);
     }
+    let lit = |(subject, _): &(Subject, Vec<Effect>)| matches!(subject.frames, Frames::Stage(_));
+    let mirroring = match chosen.iter().any(lit) {
+        true => table_of_mirroring(&kernels)?,
+        false => None,
+    };
     progress.begin(chosen.iter().map(|(_, effects)| effects.len()).sum());
     for (subject, effects) in &chosen {
-        let scenes = subject.scenes()?;
+        let mut scenes = subject.scenes()?;
+        if let Some(table) = &mirroring {
+            scenes
+                .iter_mut()
+                .for_each(|scene| scene.give_mirroring(table));
+        }
         let pixels = scenes.first().map_or(0, |scene| scene.size().pixels());
         if options.largest.is_some_and(|largest| pixels > largest) {
             continue;

@@ -207,9 +207,10 @@ impl Pair<'_> {
                 }
                 Kind::Double => {
                     if self.effect.drawing() != Drawing::None {
+                        let layers = self.scenes.first().map_or(0, drawn::layers);
                         let pairs = kept.reference.iter().zip(&frames);
                         for (number, (single, double)) in pairs.enumerate() {
-                            errors.look_at_drawn(number, single, double);
+                            errors.look_at_drawn(number, single, double, layers);
                         }
                         result.rounding = errors.clone().finish();
                     }

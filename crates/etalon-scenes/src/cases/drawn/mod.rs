@@ -15,10 +15,13 @@ mod solids;
 mod surfaces;
 
 use std::fmt;
+use std::sync::Arc;
 
 use etalon_core::backend::Inputs;
 use etalon_core::graph::Graph;
+use etalon_core::image::ImageData;
 use etalon_effects::EffectError;
+use etalon_effects::environment::Surroundings;
 
 pub use self::light_map::LightMap;
 pub use self::solids::{Solid, Solids};
@@ -160,6 +163,19 @@ impl Stage {
         }
     }
 
+    /// Hands it the table of [`mirroring`], which it else makes in every frame at the cost
+    /// of far more than the case.
+    ///
+    /// [`mirroring`]: etalon_effects::environment::mirroring
+    pub fn give_mirroring(&mut self, table: &Arc<ImageData>) {
+        match self {
+            Self::Solids(solids) => solids.mirroring = Some(Arc::clone(table)),
+            Self::Surfaces(surfaces) => surfaces.mirroring = Some(Arc::clone(table)),
+            // Its own is what it is about.
+            Self::LightMap(_) => {}
+        }
+    }
+
     /// The graph of the effect; its results are outputs.
     ///
     /// # Errors
@@ -173,6 +189,25 @@ impl Stage {
         }
     }
 }
+
+/// Surroundings with a table that was given, if they have light for it.
+fn with_mirroring(
+    graph: &mut Graph,
+    surroundings: Surroundings,
+    table: Option<&Arc<ImageData>>,
+) -> Result<Surroundings, EffectError> {
+    let mirroring = match table.filter(|_| surroundings.shine()) {
+        Some(table) => Some(graph.import_texture(MIRRORING, table.desc)?),
+        None => None,
+    };
+    Ok(Surroundings {
+        mirroring,
+        ..surroundings
+    })
+}
+
+/// The import of a table that was given.
+const MIRRORING: &str = "mirroring";
 
 /// All cases with their effects.
 pub fn drawn_cases() -> impl Iterator<Item = (DrawnEffect, &'static DrawnCase)> {

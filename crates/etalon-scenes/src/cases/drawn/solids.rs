@@ -3,8 +3,11 @@
 //! Unlike those of a [`Mesh`](crate::model::Mesh), which checks them, corners and normals
 //! may be anything that an engine's buffers may hold.
 
+use std::sync::Arc;
+
 use etalon_core::backend::Inputs;
 use etalon_core::graph::Graph;
+use etalon_core::image::ImageData;
 use etalon_core::raster::{StepMode, VertexAttribute, VertexFormat, VertexLayout};
 use etalon_core::resource::BufferDesc;
 use etalon_effects::forward::{Lamps, Lighting, forward, glass, lamp_bytes};
@@ -14,7 +17,7 @@ use etalon_effects::{CameraParams, EffectError};
 use glam::{DMat4, DVec3, Vec3};
 
 use super::super::paint::SMALL;
-use super::{CaseError, LightMap, Stage};
+use super::{CaseError, LightMap, MIRRORING, Stage, with_mirroring};
 use crate::frame::FrameSize;
 
 /// Three corners.
@@ -145,6 +148,8 @@ pub struct Solids {
     /// Light from everywhere.
     pub environment: Option<LightMap>,
     lamps: Vec<u8>,
+    /// See [`Stage::give_mirroring`].
+    pub(super) mirroring: Option<Arc<ImageData>>,
 }
 
 impl Solids {
@@ -173,6 +178,7 @@ impl Solids {
                 ..Surroundings::default()
             },
             environment: None,
+            mirroring: None,
             lamps: Vec::new(),
         })
     }
@@ -234,6 +240,9 @@ impl Solids {
         });
         if let Some(map) = &self.environment {
             inputs = map.give(inputs);
+        }
+        if let Some(table) = &self.mirroring {
+            inputs = inputs.texture(MIRRORING, table);
         }
         // Nobody asks for it where there are no lights, and then it is empty.
         match self.lamps.is_empty() {
@@ -299,6 +308,7 @@ impl Solids {
         if let Some(map) = &self.environment {
             surroundings.environment = Some(map.import(&mut graph)?);
         }
+        let surroundings = with_mirroring(&mut graph, surroundings, self.mirroring.as_ref())?;
         let lighting = Lighting {
             lamps: Lamps::import(&mut graph, "lamps", self.lights.len() as u32)?,
             surroundings,

@@ -1,5 +1,7 @@
 //! A G-buffer and its lights, as a case gives them.
 
+use std::sync::Arc;
+
 use etalon_core::backend::Inputs;
 use etalon_core::graph::Graph;
 use etalon_core::image::ImageData;
@@ -10,7 +12,7 @@ use glam::{DMat4, DVec3, Vec3};
 
 use super::super::Step;
 use super::super::paint::{Canvas, Spot, Texel};
-use super::{CaseError, LightMap, Stage};
+use super::{CaseError, LightMap, MIRRORING, Stage, with_mirroring};
 
 /// Images of surfaces, and what lights them.
 #[derive(Clone, Debug)]
@@ -27,6 +29,8 @@ pub struct Surfaces {
     pub surroundings: Surroundings,
     /// Light from everywhere.
     pub environment: Option<LightMap>,
+    /// See [`Stage::give_mirroring`].
+    pub(super) mirroring: Option<Arc<ImageData>>,
 }
 
 impl Surfaces {
@@ -50,6 +54,7 @@ impl Surfaces {
             lights: Vec::new(),
             surroundings: Surroundings::default(),
             environment: None,
+            mirroring: None,
         })
     }
 
@@ -114,6 +119,10 @@ impl Surfaces {
         let inputs = images.fold(Inputs::new(), |inputs, (name, image)| {
             inputs.texture(name, image)
         });
+        let inputs = match &self.mirroring {
+            Some(table) => inputs.texture(MIRRORING, table),
+            None => inputs,
+        };
         match &self.environment {
             Some(map) => map.give(inputs),
             None => inputs,
@@ -137,6 +146,7 @@ impl Surfaces {
         if let Some(map) = &self.environment {
             surroundings.environment = Some(map.import(&mut graph)?);
         }
+        let surroundings = with_mirroring(&mut graph, surroundings, self.mirroring.as_ref())?;
         let light = lighting(
             &mut graph,
             &self.view,

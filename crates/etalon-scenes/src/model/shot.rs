@@ -154,8 +154,8 @@ impl Shot {
             above: Vec3::new(0.5, 0.6, 0.8),
             below: Vec3::splat(0.15),
             background: Vec3::new(0.05, 0.06, 0.08),
-            environment: None,
             mirroring: Some(mirroring(graph)?),
+            ..Surroundings::default()
         })
     }
 
@@ -212,6 +212,7 @@ impl Shot {
                 velocity: prepass.velocity,
                 camera: view.camera,
                 delta_time,
+                beyond: None,
             },
         })
     }

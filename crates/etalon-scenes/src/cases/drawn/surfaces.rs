@@ -6,6 +6,7 @@ use etalon_core::image::ImageData;
 use etalon_effects::EffectError;
 use etalon_effects::geometry::{GBuffer, View};
 use etalon_effects::lighting::{PunctualLight, Surroundings, lighting};
+use etalon_effects::probes::{Probe, ProbeMaps, Probes, probe_bytes, probe_map};
 use glam::{DMat4, DVec3, Vec3};
 
 use super::super::Step;
@@ -27,7 +28,23 @@ pub struct Surfaces {
     pub surroundings: Surroundings,
     /// Light from everywhere.
     pub environment: Option<LightMap>,
+    /// Light captured nearby, if there is any.
+    pub rooms: Option<Rooms>,
 }
+
+/// Probes of one map.
+#[derive(Clone, Debug)]
+pub struct Rooms {
+    /// Where they count.
+    pub probes: Vec<Probe>,
+    /// What all of them have captured.
+    pub map: LightMap,
+    list: Vec<u8>,
+}
+
+/// The names of the probes' list and map among the graph's imports.
+const LIST: &str = "probes";
+const CAPTURED: &str = "captured";
 
 impl Surfaces {
     /// On a canvas, each texel a function of its place, without light.
@@ -50,6 +67,7 @@ impl Surfaces {
             lights: Vec::new(),
             surroundings: Surroundings::default(),
             environment: None,
+            rooms: None,
         })
     }
 
@@ -83,6 +101,18 @@ impl Surfaces {
         }
     }
 
+    /// With probes around, of the map of one of them.
+    pub(super) fn around(self, probes: &[Probe], map: LightMap) -> Self {
+        Self {
+            rooms: Some(Rooms {
+                probes: probes.to_vec(),
+                map,
+                list: Vec::new(),
+            }),
+            ..self
+        }
+    }
+
     /// The same with everything, the eye and the lights, moved in the world.
     pub(super) fn moved(mut self, by: DVec3) -> Self {
         self.view.view = DMat4::from_translation(-by);
@@ -90,11 +120,18 @@ impl Surfaces {
         for light in &mut self.lights {
             light.position += by;
         }
+        for probe in self.rooms.iter_mut().flat_map(|rooms| &mut rooms.probes) {
+            probe.position += by;
+            probe.room.centre += by;
+        }
         self
     }
 
     /// As a stage.
-    pub(super) fn staged(self) -> Result<Stage, CaseError> {
+    pub(super) fn staged(mut self) -> Result<Stage, CaseError> {
+        if let Some(rooms) = &mut self.rooms {
+            rooms.list = probe_bytes(&self.view, &rooms.probes).map_err(EffectError::from)?;
+        }
         Ok(Stage::Surfaces(Box::new(self)))
     }
 
@@ -114,6 +151,12 @@ impl Surfaces {
         let inputs = images.fold(Inputs::new(), |inputs, (name, image)| {
             inputs.texture(name, image)
         });
+        let inputs = match &self.rooms {
+            Some(rooms) => inputs
+                .buffer(LIST, &rooms.list)
+                .texture(CAPTURED, &rooms.map.base),
+            None => inputs,
+        };
         match &self.environment {
             Some(map) => map.give(inputs),
             None => inputs,
@@ -137,6 +180,9 @@ impl Surfaces {
         if let Some(map) = &self.environment {
             surroundings.environment = Some(map.import(&mut graph)?);
         }
+        if let Some(rooms) = &self.rooms {
+            surroundings.probes = rooms.import(&mut graph)?;
+        }
         let light = lighting(
             &mut graph,
             &self.view,
@@ -146,5 +192,15 @@ impl Surfaces {
         )?;
         graph.output("light", light)?;
         Ok(graph)
+    }
+}
+
+impl Rooms {
+    /// Declares the passes that make a probe's map.
+    fn import(&self, graph: &mut Graph) -> Result<Option<Probes>, EffectError> {
+        let base = graph.import_texture(CAPTURED, self.map.base.desc)?;
+        let maps = ProbeMaps::new(graph, self.map.base.desc.extent.height, 1)?;
+        let maps = probe_map(graph, maps, 0, base, &self.map.prefilter())?;
+        Probes::import(graph, LIST, maps, self.probes.len() as u32)
     }
 }

@@ -227,8 +227,8 @@ impl Content {
         let inputs = match self {
             Self::Frame(frame) => frame.import(&mut graph, DELTA_TIME)?,
             Self::Shot(shot, size) => {
-                let sky = Shot::sky(&mut graph)?;
-                let drawn = shot.draw(&mut graph, *size, sky, DELTA_TIME)?;
+                let around = shot.among_rooms(&mut graph)?;
+                let drawn = shot.draw(&mut graph, *size, around, DELTA_TIME)?;
                 // Or nobody would need it.
                 graph.output("deferred", drawn.deferred)?;
                 drawn.inputs

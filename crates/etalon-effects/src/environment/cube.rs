@@ -114,6 +114,9 @@ fn face_of(way: DVec3) -> (u32, DVec2) {
         .unwrap_or((0, DVec2::ZERO))
 }
 
+/// Most places in x and in y for each texel of any mip, as `environment/faces` has it.
+pub(super) const MOST_PARTS: u32 = 256;
+
 /// Places in x and in y for each texel of a map's largest mip, so that all texels of
 /// faces are met: a map's texel covers up to 5.2 times its area of the square, a face's at
 /// least 0.19 times.

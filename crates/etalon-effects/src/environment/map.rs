@@ -98,11 +98,20 @@ impl EnvironmentMap {
         // So many places that every texel of the picture is met.
         let parts = (2 * size[0] / (3 * side)).clamp(1, 32);
         let sample = |at: DVec3| equirectangular(&texels, size, at);
-        Self::of_light(side, parts, &sample, irradiance)
+        let mut levels = vec![resampled(side, parts, &sample)];
+        for mip in 1..mips(side) {
+            let previous = &levels[levels.len() - 1];
+            let finer = side >> (mip - 1);
+            let sample = |at: DVec3| octahedral_light(previous, finer, at);
+            let level = resampled(side >> mip, PARTS, &sample);
+            levels.push(level);
+        }
+        Self::of_levels(side, &levels, irradiance)
     }
 
-    /// As [`EnvironmentMap::of_equirectangular`], of the faces of a cube: a side of 1½
-    /// times theirs keeps all of their detail.
+    /// As [`EnvironmentMap::of_equirectangular`], of the faces of a cube, each mip the mean
+    /// of the faces themselves: what [`of_faces`](super::of_faces) makes on a device. A side
+    /// of 1½ times theirs keeps all of their detail.
     ///
     /// # Errors
     /// If `side` is out of its range, or an image does not fit into memory.
@@ -112,29 +121,24 @@ impl EnvironmentMap {
         let (face, parts) = (picture.side(), super::cube::parts(picture.side(), side));
         let irradiance = Irradiance::of_cube(picture)?;
         let sample = |at: DVec3| super::cube::light(&texels, face, at);
-        Self::of_light(side, parts, &sample, irradiance)
+        let level = |mip: u32| {
+            let parts = (parts << mip).min(super::cube::MOST_PARTS);
+            resampled(side >> mip, parts, &sample)
+        };
+        let levels: Vec<Vec<DVec3>> = (0..mips(side)).map(level).collect();
+        Self::of_levels(side, &levels, irradiance)
     }
 
-    /// Of light by direction, each texel of the largest mip as the mean over
-    /// `parts × parts` places.
-    fn of_light(
+    /// Of all mips, the largest first.
+    fn of_levels(
         side: u32,
-        parts: u32,
-        sample: &dyn Fn(DVec3) -> DVec3,
+        levels: &[Vec<DVec3>],
         irradiance: Irradiance,
     ) -> Result<Self, EffectError> {
-        let mut levels = vec![resampled(side, parts, sample)];
-        for mip in 1..mips(side) {
-            let previous = &levels[levels.len() - 1];
-            let finer = side >> (mip - 1);
-            let sample = |at: DVec3| octahedral_light(previous, finer, at);
-            let level = resampled(side >> mip, PARTS, &sample);
-            levels.push(level);
-        }
         let [width, height] = image_size(side);
         let desc = TextureDesc::d2(width, height, Format::Rgba16Float);
         let mut image = ImageData::zeroed(desc)?;
-        for (mip, level) in (0..).zip(&levels) {
+        for (mip, level) in (0..).zip(levels) {
             let ([left, top], own) = (corner(side, mip), side >> mip);
             for (at, light) in (0..).zip(level) {
                 let [r, g, b] = light.as_vec3().to_array();

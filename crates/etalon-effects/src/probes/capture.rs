@@ -11,7 +11,8 @@ use glam::{DMat3, DMat4, DVec2, DVec3, Vec2};
 
 use crate::check::Settings;
 use crate::environment::{
-    FACES, MAX_FACE, Mirrored, Prefilter, Surroundings, check_side, face_direction, of_faces,
+    FACES, MAX_FACE, Mirrored, Prefilter, Surroundings, check_side, face_direction, mirroring,
+    of_faces,
 };
 use crate::forward::{Lamps, Lighting, forward_into};
 use crate::geometry::{Geometry, Item, View};
@@ -121,11 +122,15 @@ pub fn faces(
     let mut desc = TextureDesc::d2(face, face, Format::Rgba16Float);
     desc.extent.depth_or_layers = FACES;
     let mut faces = graph.texture("captured faces", desc);
-    let surroundings = Surroundings {
+    let mut surroundings = Surroundings {
         probes: None,
         mirrored: Mirrored::Lit,
         ..captured.surroundings
     };
+    if surroundings.shine() && surroundings.mirroring.is_none() {
+        // Once for all of them.
+        surroundings.mirroring = Some(mirroring(graph)?);
+    }
     let all = views(captured.position, captured.near);
     for ((layer, view), lamps) in (0..).zip(all).zip(captured.lamps) {
         let geometry = Geometry {

@@ -15,9 +15,10 @@ use crate::truth::smooth;
 #[must_use]
 pub fn box_exit(point: DVec3, way: DVec3, half: DVec3) -> DVec3 {
     let point = point.clamp(-half, half);
-    // Of all points ahead where the ray meets a plane of a side that it does not come
-    // from, the one that is least outside of the others: the exit is not outside at all.
-    let mut best: Option<(f64, DVec3)> = None;
+    // Of all points ahead where the ray meets a plane, the one that is least outside of the
+    // others' sides: the exit is not outside at all. A ray along a side may leave by it in
+    // so long a time that what it moves until then is no number: then the first.
+    let mut best: Option<([f64; 2], DVec3)> = None;
     for axis in 0..3 {
         for side in [-half[axis], half[axis]] {
             // Ahead is the side to which the ray goes.
@@ -30,11 +31,10 @@ pub fn box_exit(point: DVec3, way: DVec3, half: DVec3) -> DVec3 {
             }
             let mut met = point + way * time;
             met[axis] = side;
-            let outside = ((met.abs() - half) / half.max(DVec3::splat(f64::MIN_POSITIVE)))
-                .max_element()
-                .max(0.0);
-            if best.is_none_or(|(least, _)| outside < least) {
-                best = Some((outside, met));
+            let beyond = (met.abs() - half) / half.max(DVec3::splat(f64::MIN_POSITIVE));
+            let rank = [beyond.max_element().max(0.0), time];
+            if best.is_none_or(|(least, _)| rank < least) {
+                best = Some((rank, met));
             }
         }
     }

@@ -73,14 +73,13 @@ fn from_host(base: &ImageData, picture: &CubePicture, side: u32) -> f64 {
 #[test]
 fn faces_become_the_map_that_f64_makes_of_them() {
     let kernels = etalon::effects::kernels();
-    // Mips are means of faces here and of larger mips on the host: with a texel of the
-    // face in each of its places both are the same to what bends between them. Of a
-    // constant all is exact.
+    // Of a constant all is exact; else means of up to 4096 places in f32, of directions whose
+    // places in faces of 48 texels are right to 2^-19 of one.
     let constant = |_: DVec3| DVec3::new(1.0, 0.25, 3.0);
     type Radiance<'a> = &'a dyn Fn(DVec3) -> DVec3;
     for (name, radiance, side, most) in [
         ("constant", &constant as Radiance<'_>, 32, 0.0),
-        ("smooth", &sky as Radiance<'_>, 64, 16.0),
+        ("smooth", &sky as Radiance<'_>, 64, 2.05),
     ] {
         let picture = CubePicture::of_directions(48, radiance).unwrap();
         let mut first: Option<Execution> = None;
@@ -111,7 +110,7 @@ fn faces_become_the_map_that_f64_makes_of_them() {
         let mut interpreter = etalon_tests::cpu().unwrap();
         let execution = made(interpreter.as_mut(), &picture, 64, &kernels);
         let worst = from_host(execution.output("base").unwrap(), &picture, 64);
-        assert!(worst > 60.0, "{by}: {worst}");
+        assert!(worst > 12.0, "{by}: {worst}");
     }
 }
 
@@ -375,14 +374,14 @@ fn six_views_see_a_room_as_rays_do() {
         for (x, y) in (1..63).flat_map(|y| (1..63).map(move |x| (x, y))) {
             let place = (DVec2::new(f64::from(x), f64::from(y)) - 0.5) / 31.0 - 1.0;
             let (want, to_edge) = wall(unfolded(place));
-            if to_edge > 0.25 {
+            if to_edge > 0.4 {
                 let [r, g, b, _] = base.texel(x, y, 0, 0).unwrap().to_f64();
                 let off = (DVec3::new(r, g, b).as_vec3() - want).abs().max_element();
                 assert!(off < 1e-3, "{x}, {y}: {off}");
                 held += 1;
             }
         }
-        assert!(held > 1000, "{held}");
+        assert!(held > 400, "{held}");
         let first = first.get_or_insert_with(|| execution.clone());
         for name in ["faces", "base"] {
             let (a, b) = (first.output(name).unwrap(), execution.output(name).unwrap());

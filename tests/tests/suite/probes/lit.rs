@@ -214,9 +214,16 @@ fn a_model_is_lit_alike_as_it_is_drawn() {
         }
         println!("{}: {lit} lit, {worst}", executor.info());
         assert!(lit > 1000 && worst < 0.02, "{lit}, {worst}");
+        // Normals are interpolated to some ulps, which moves light by steps of f16.
         let first = first.get_or_insert_with(|| images.clone());
         for (a, b) in first.iter().zip(&images) {
-            assert_eq!(difference(a, b), None, "{}", executor.info());
+            let pixels = (0..54).flat_map(|y| (0..96).map(move |x| (x, y)));
+            let moved = pixels.map(|(x, y)| {
+                let (a, b) = (colour(a, x, y), colour(b, x, y));
+                ((a - b).abs() / (a + b + 1e-3)).max_element()
+            });
+            let moved = moved.fold(0.0, f64::max);
+            assert!(moved < 2e-3, "{moved} on {}", executor.info());
         }
     }
 }

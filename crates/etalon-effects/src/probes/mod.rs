@@ -13,6 +13,11 @@
 //! and, where the screen has no answer, [`ssr`](mod@crate::ssr) read:
 //! [`Surroundings::probes`](crate::lighting::Surroundings::probes).
 //!
+//! How far off that is, `the_models_error_grows_with_the_depth_of_what_is_in_the_room`
+//! says of mirrors on the floor of a room of 8 × 3 × 6 metres: what stands 10 cm before the
+//! wall is seen 0.7° beside where it is, 50 cm 3.6°, one metre 7.4°. Without the room it
+//! would be 24° for the wall itself.
+//!
 //! # Blending
 //! The first probe of a list has its influence as its share, the next its own of what
 //! that leaves, and so on; the world has the rest. Shares are smooth and sum to 1. Of

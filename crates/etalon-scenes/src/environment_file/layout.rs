@@ -10,7 +10,9 @@ use super::{EnvironmentError, EnvironmentPicture, check_face, size};
 pub enum Layout {
     /// Twice as wide as high: see [`EnvironmentMap`](etalon_effects::environment::EnvironmentMap).
     Equirectangular,
-    /// Six faces one below the other: +x, −x, +y, −y, +z, −z.
+    /// Six faces one below the other: +x, −x, +y, −y, +z, −z. OpenEXR has the first and
+    /// the last texels of such faces on their edges, where two faces show the same; its
+    /// files are interpolated to texels that end there.
     Column,
     /// Six faces from left to right, in the same order.
     Row,
@@ -136,11 +138,13 @@ impl Layout {
         }
     }
 
-    /// Takes a picture apart.
+    /// Takes a picture apart. With `to_edges` the first and the last texels of a face are
+    /// on its edges, as OpenEXR has them, and not beside them.
     pub(super) fn picture(
         self,
         picture: ImageData,
         order: FaceOrder,
+        to_edges: bool,
     ) -> Result<EnvironmentPicture, EnvironmentError> {
         let [width, height] = size(&picture);
         let [columns, rows] = self.shape();
@@ -159,16 +163,40 @@ impl Layout {
         let side = check_face(width / columns)?;
         let faces = self.faces(order);
         let texels = picture.to_rgba_f32()?;
-        let cube = CubePicture::from_fn(side, |face, x, y| {
+        let texel = |face: u32, [x, y]: [u32; 2]| {
             let ([left, top], turn) = faces[face as usize];
             let [x, y] = turn.texel(side, [x, y]);
             let row = u64::from(top * side + y) * u64::from(width);
             let at = usize::try_from(row + u64::from(left * side + x)).unwrap_or(usize::MAX);
-            let [r, g, b, _] = texels.get(at).copied().unwrap_or_default();
+            texels.get(at).copied().unwrap_or_default()
+        };
+        let cube = CubePicture::from_fn(side, |face, x, y| {
+            let [r, g, b, _] = match to_edges {
+                true => between(side, [x, y], |at| texel(face, at)),
+                false => texel(face, [x, y]),
+            };
             [r, g, b]
         })?;
         Ok(EnvironmentPicture::Cube(cube))
     }
+}
+
+/// What is at a texel's centre where texels are on the corners of as many squares, one
+/// less in each axis: interpolated between four.
+fn between(side: u32, at: [u32; 2], texel: impl Fn([u32; 2]) -> [f32; 4]) -> [f32; 4] {
+    let last = side - 1;
+    let axis = at.map(|at| {
+        let place = (f64::from(at) + 0.5) * f64::from(last) / f64::from(side);
+        let low = (place as u32).min(last);
+        (low, (low + 1).min(last), (place - f64::from(low)) as f32)
+    });
+    let [(left, right, across), (top, bottom, down)] = axis;
+    let row = |y: u32| {
+        let (a, b) = (texel([left, y]), texel([right, y]));
+        std::array::from_fn(|k| a[k] * (1.0 - across) + b[k] * across)
+    };
+    let (upper, lower): ([f32; 4], [f32; 4]) = (row(top), row(bottom));
+    std::array::from_fn(|k| upper[k] * (1.0 - down) + lower[k] * down)
 }
 
 /// Six pictures as a cube.
@@ -207,6 +235,8 @@ pub(super) fn assembled(
 
 #[cfg(test)]
 mod tests {
+    use etalon_core::Format;
+    use etalon_core::resource::TextureDesc;
     use etalon_effects::environment::face_direction;
     use glam::{DVec2, DVec3};
 
@@ -288,6 +318,47 @@ mod tests {
                 assert_eq!(place(face_direction(face, own)), turned, "{face}");
             }
         }
+    }
+
+    /// Texels on the edges show the same directions as those beside them, interpolated.
+    #[test]
+    fn faces_to_their_edges_are_read_between_texels() {
+        let side = 5;
+        let place = |at: u32, steps: f32, first: f32| (at as f32 + first) / steps * 2.0 - 1.0;
+        let texels: Vec<[f32; 4]> = (0..6 * side)
+            .flat_map(|y| (0..side).map(move |x| (x, y)))
+            .map(|(x, y)| {
+                [
+                    place(x, 4.0, 0.0),
+                    place(y % side, 4.0, 0.0),
+                    (y / side) as f32,
+                    1.0,
+                ]
+            })
+            .collect();
+        let desc = TextureDesc::d2(side, 6 * side, Format::Rgba32Float);
+        let image = ImageData::from_rgba_f32(desc, &texels).unwrap();
+        let picture = Layout::Column
+            .picture(image, FaceOrder::Seen, true)
+            .unwrap();
+        let EnvironmentPicture::Cube(cube) = picture else {
+            panic!("no cube");
+        };
+        for (face, y) in (0..6).flat_map(|face| (0..side).map(move |y| (face, y))) {
+            for x in 0..side {
+                let turned = if matches!(face, 2 | 3) { -1.0 } else { 1.0 };
+                let want = [x, y].map(|at| f64::from(turned * place(at, 5.0, 0.5)));
+                let [u, v, of, _] = cube.image().texel(x, y, face, 0).unwrap().to_f64();
+                let off = (u - want[0]).abs().max((v - want[1]).abs());
+                assert!(
+                    off < 1e-6 && of == f64::from(face),
+                    "{face}, {x}, {y}: {u}, {v}"
+                );
+            }
+        }
+        // One texel is all of a face.
+        let one = between(1, [0, 0], |at| [at[0] as f32, at[1] as f32, 7.0, 1.0]);
+        assert_eq!(one, [0.0, 0.0, 7.0, 1.0]);
     }
 
     #[test]

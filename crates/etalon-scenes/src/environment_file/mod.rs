@@ -172,8 +172,13 @@ pub fn decode_environment(
             expected: "2 : 1, 1 : 6, 6 : 1, 4 : 3 or 3 : 4",
         })?,
     };
-    layout.picture(picture, options.faces)
+    let to_edges =
+        bytes.starts_with(EXR) && layout == Layout::Column && options.faces == FaceOrder::Seen;
+    layout.picture(picture, options.faces, to_edges)
 }
+
+/// What an OpenEXR file begins with.
+const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
 /// Reads the faces of a cube from six files, in the order +x, −x, +y, −y, +z, −z.
 ///
@@ -205,7 +210,6 @@ fn size(picture: &ImageData) -> [u32; 2] {
 
 /// The picture of a file, `rgba32float`.
 fn decode(bytes: &[u8], max_bytes: u64) -> Result<ImageData, EnvironmentError> {
-    const EXR: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
     if bytes.starts_with(EXR) {
         let options = ExrOptions {
             colour_format: Format::Rgba32Float,

@@ -307,9 +307,10 @@ fn a_cube_of_openexr_hangs_together() {
     };
     let cube = load(FaceOrder::Seen);
     assert_eq!(cube.side(), 256);
+    // Half a texel from the edge on either side.
     let (right, wrong) = (seams(&cube), seams(&load(FaceOrder::CubeTexture)));
     println!("along edges {right}, with faces turned otherwise {wrong}");
-    assert!(right < 0.06 && wrong > 3.0 * right, "{right}, {wrong}");
+    assert!(right < 0.1 && wrong > 4.0 * right, "{right}, {wrong}");
     let map = EnvironmentPicture::Cube(cube).map(64).unwrap();
     assert!(map.irradiance().at(DVec3::Y).min_element() > 0.0);
 }

@@ -246,6 +246,10 @@ fn rays_leave_boxes_where_f64_says() {
                 Some(first) => assert!(*first == found.bytes, "{half} on {}", executor.info()),
             }
         }
+        if half == Vec3::ZERO {
+            // There is nowhere else to be.
+            continue;
+        }
         let found = run(executors[0].as_mut(), &planted, images, half, capture);
         let (off, _) = wrong(&found, &points, &ways, half, capture);
         assert!(off > 100, "only {off} rays of the plant are wrong");

@@ -67,7 +67,7 @@ impl Bench {
     /// Lights of all colours, brighter to several sides.
     pub(super) fn coloured(mask: impl Fn(u32, u32) -> [f32; 4]) -> Self {
         let light = |k: f64| Light {
-            middle: DVec3::new(0.4 + 0.3 * k, 1.0 - 0.2 * k, 0.5),
+            middle: DVec3::new(0.8 + 0.3 * k, 1.0 - 0.2 * k, 0.75),
             slope: DMat3::from_cols(
                 DVec3::new(0.2, 0.0, 0.1 * k),
                 DVec3::new(0.0, -0.2, 0.1),

@@ -66,9 +66,10 @@ fn picture(
 /// of what is allowed.
 ///
 /// Of light linear in the direction a map of 64 keeps all but what bends within a texel
-/// of 2 / 62: directions on an octahedron's face by up to 9, over 8 between texels and
-/// over 24 in their mean, in two axes: 0.004 of the slope with the picture it was made
-/// from. And five roundings to f16.
+/// of h = 2 / 62. On an octahedron's face directions bend by up to 18 in each axis, over 8
+/// between texels and over 24 in their mean: 0.006. Across its edges they have a kink: the
+/// slope jumps by up to 2 √2, of which h / 4 is lost between texels and h / 8 in their
+/// mean: 0.034. And two roundings to f16, of the map and of the picture.
 fn apart(bench: &Bench, image: &ImageData) -> (usize, f64) {
     let (mut count, mut worst) = (0, 0_f64);
     let found = unanswered(bench, &blind());
@@ -89,7 +90,7 @@ fn apart(bench: &Bench, image: &ImageData) -> (usize, f64) {
             continue;
         }
         let want = bench.light(point, way);
-        let allowed = slope * 0.004 + want * (2.5 / 1024.0);
+        let allowed = slope * 0.04 + want * (1.0 / 1024.0);
         let off = (colour(image, x, y) - want).abs() / allowed;
         if off.max_element() > worst.max(1.0) {
             println!("{x}, {y}: {} in place of {want}", colour(image, x, y));
@@ -134,7 +135,7 @@ fn without_the_screen_it_is_what_rooms_and_the_world_show() {
         let strict = (&kernels, Arithmetic::Strict);
         let image = picture(&bench, interpreter.as_mut(), strict, &blind());
         let (_, worst) = apart(&bench, &image);
-        assert!(worst > 4.0, "{path}: {worst}");
+        assert!(worst > 2.0, "{path}: {worst}");
     }
 }
 

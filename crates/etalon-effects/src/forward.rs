@@ -18,12 +18,12 @@
 pub(crate) mod demand;
 
 use etalon_core::Format;
-use etalon_core::graph::{Buffer, ClearValue, Draw, Graph, Load, Texture};
+use etalon_core::graph::{Buffer, ClearValue, Draw, Graph, Load, Texture, TextureView, Written};
 use etalon_core::raster::{Blend, CullMode, DepthState, TargetState};
 use etalon_core::resource::BufferDesc;
 
 use crate::check::Settings;
-use crate::environment::{Around, Surroundings};
+use crate::environment::{Around, Mirrored, Surroundings};
 use crate::geometry::{Geometry, Item, Prepass, View};
 use crate::lighting::PunctualLight;
 use crate::{EffectError, SettingError};
@@ -103,9 +103,13 @@ impl Lighting {
     }
 
     /// Makes what is missing, once for all draws.
-    fn ready(&self, graph: &mut Graph) -> Result<Lit, EffectError> {
-        let around = match self.surroundings.shine() {
-            true => Some(self.surroundings.ready(graph)?),
+    fn ready(&self, graph: &mut Graph, mirrored: Mirrored) -> Result<Lit, EffectError> {
+        let surroundings = Surroundings {
+            mirrored,
+            ..self.surroundings
+        };
+        let around = match surroundings.shine() {
+            true => Some(surroundings.ready(graph)?),
             false => None,
         };
         Ok(Lit {
@@ -134,7 +138,7 @@ impl Lit {
                 .set("count", lamps.count);
         }
         match &self.around {
-            Some(around) => around.set(draw, &geometry.view),
+            Some(around) => around.light(draw, geometry.view.view),
             None => draw,
         }
     }
@@ -177,12 +181,50 @@ pub fn forward(
     lighting: &Lighting,
     thin: bool,
 ) -> Result<Shaded, EffectError> {
+    let light = geometry.target(graph, "forward light", Format::Rgba16Float);
+    let written = opaque(graph, geometry, prepass, lighting, thin, light.into())?;
+    Ok(Shaded {
+        light: written.texture("light")?,
+        depth: match prepass {
+            Some(prepass) => prepass.depth,
+            None => written.texture("depth")?,
+        },
+        thin: match thin {
+            true => Some(ThinGBuffer {
+                normal: written.texture("normal")?,
+                specular: written.texture("specular")?,
+            }),
+            false => None,
+        },
+    })
+}
+
+/// As [`forward`], into a layer of a texture as large as the picture: the texture with
+/// what is drawn.
+pub(crate) fn forward_into(
+    graph: &mut Graph,
+    geometry: &Geometry<'_>,
+    lighting: &Lighting,
+    light: TextureView,
+) -> Result<Texture, EffectError> {
+    let written = opaque(graph, geometry, None, lighting, false, light)?;
+    Ok(written.texture("light")?)
+}
+
+/// The pass of opaque surfaces.
+fn opaque(
+    graph: &mut Graph,
+    geometry: &Geometry<'_>,
+    prepass: Option<&Prepass>,
+    lighting: &Lighting,
+    thin: bool,
+    light: TextureView,
+) -> Result<Written, EffectError> {
     geometry.validate()?;
     lighting.validate()?;
-    let lit = lighting.ready(graph)?;
+    let lit = lighting.ready(graph, lighting.surroundings.mirrored)?;
     let (state, depth, load) = geometry.against(graph, prepass);
     let draws = geometry.draws(|item| lit.draw(geometry, item, state).feature("thin", thin));
-    let light = geometry.target(graph, "forward light", Format::Rgba16Float);
     let background = lighting.surroundings.background.extend(1.0).to_array();
     let nothing = Load::Clear(ClearValue::Float([0.0; 4]));
     let beside = [
@@ -198,21 +240,7 @@ pub fn forward(
     for (name, target) in beside.into_iter().flatten() {
         pass = pass.colour(name, target, nothing);
     }
-    let written = pass.draws(draws).finish()?;
-    Ok(Shaded {
-        light: written.texture("light")?,
-        depth: match prepass {
-            Some(prepass) => prepass.depth,
-            None => written.texture("depth")?,
-        },
-        thin: match thin {
-            true => Some(ThinGBuffer {
-                normal: written.texture("normal")?,
-                specular: written.texture("specular")?,
-            }),
-            false => None,
-        },
-    })
+    Ok(pass.draws(draws).finish()?)
 }
 
 /// Draws blended surfaces over `light`, hidden by what is nearer in `depth`.
@@ -234,7 +262,7 @@ pub fn glass(
 ) -> Result<Texture, EffectError> {
     geometry.validate()?;
     lighting.validate()?;
-    let lit = lighting.ready(graph)?;
+    let lit = lighting.ready(graph, Mirrored::Lit)?;
     let state = DepthState {
         write: false,
         ..geometry.view.nearer()

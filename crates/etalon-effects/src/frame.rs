@@ -12,20 +12,22 @@
 //! | `forward/thin` | normals and specular colour beside light that is drawn |
 //! | `lighting`, `forward/opaque` | the light of opaque surfaces, by either way |
 //! | `forward/glass` | what is seen through |
+//! | `probes` | light captured nearby |
+//! | `ssr/fallback` | surroundings in reflections where the screen has no answer |
 //! | `ssr`, `exposure`, `bloom`, `composite` | the effects on the screen |
 
 use etalon_core::graph::{Decision, Graph, Texture};
 
 use crate::demand::{Calls, Demands, Outputs, Thresholds};
-use crate::environment::Surroundings;
+use crate::environment::{Mirrored, Surroundings};
 use crate::forward::{Lamps, Lighting, forward, glass};
 use crate::geometry::{Geometry, Item, View, gbuffer, prepass};
 use crate::lighting::{PunctualLight, lighting};
 use crate::registry::effect;
 use crate::tiles::Tiling;
 use crate::{
-    Chain, ChainSettings, EffectError, SceneInputs, chain, forward as forward_module, geometry,
-    lighting as lighting_module, ssr,
+    Beyond, Chain, ChainSettings, EffectError, SceneInputs, chain, forward as forward_module,
+    geometry, lighting as lighting_module, ssr,
 };
 
 /// What is asked of a frame.
@@ -277,6 +279,10 @@ pub fn of_geometry(
         view: drawables.view,
         size: drawables.size,
     };
+    let drawables = &Drawables {
+        surroundings: surroundings(graph, drawables, request, &parts),
+        ..*drawables
+    };
     let lit = Lighting {
         lamps: drawables.lamps,
         surroundings: drawables.surroundings,
@@ -322,6 +328,47 @@ pub fn of_geometry(
     frame.output(graph, &request.outputs)
 }
 
+/// What of the surroundings is called for: probes only where surfaces are lit, and nothing
+/// is left for reflections on the screen to mirror where there are none.
+fn surroundings(
+    graph: &mut Graph,
+    drawables: &Drawables<'_>,
+    request: &Request,
+    parts: &Parts,
+) -> Surroundings {
+    let asked = drawables.surroundings;
+    let lit = parts.lighting || parts.forward || parts.glass;
+    let decision = match (asked.probes, lit) {
+        (None, _) => Decision::absent("there are none"),
+        (Some(_), false) => Decision::absent("no surface is lit"),
+        (Some(probes), true) => Decision::runs(format!("{} light surfaces", probes.count)),
+    };
+    let probes = asked.probes.filter(|_| decision.is_run());
+    graph.decide("probes", decision);
+    let mirrored = match request.called_for().ssr {
+        Some(_) => asked.mirrored,
+        None => Mirrored::Lit,
+    };
+    if asked.mirrored == Mirrored::Reflected {
+        graph.decide(
+            "ssr/fallback",
+            match mirrored {
+                Mirrored::Reflected => {
+                    Decision::runs("reflections show surroundings where the screen has no answer")
+                }
+                Mirrored::Lit => Decision::absent(
+                    "there are no reflections: light from everywhere is mirrored as it lights",
+                ),
+            },
+        );
+    }
+    Surroundings {
+        probes,
+        mirrored,
+        ..asked
+    }
+}
+
 /// The effects on what has been drawn.
 fn finish(
     graph: &mut Graph,
@@ -340,6 +387,7 @@ fn finish(
             velocity: drawn.velocity,
             camera: drawables.view.camera,
             delta_time: drawables.delta_time,
+            beyond: beyond(drawables),
         };
         return on_screen(graph, &inputs, request);
     }
@@ -350,6 +398,16 @@ fn finish(
     let settings = request.called_for();
     let of_light = crate::chain::on_light(graph, colour, drawables.delta_time, &settings)?;
     Ok((Some(of_light.picture), Some(colour)))
+}
+
+/// What reflections show beyond the screen, where the light that is drawn is without it.
+fn beyond(drawables: &Drawables<'_>) -> Option<Beyond> {
+    let surroundings = drawables.surroundings;
+    let reflected = surroundings.mirrored == Mirrored::Reflected && surroundings.shine();
+    reflected.then_some(Beyond {
+        surroundings,
+        view: drawables.view.view,
+    })
 }
 
 /// Which passes draw.

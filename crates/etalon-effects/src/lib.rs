@@ -10,6 +10,7 @@
 //! | [`geometry`](mod@geometry) | depth, velocity and G-buffer, drawn | `shaders/geometry` |
 //! | [`lighting`](mod@lighting) | lights added up from the G-buffer | `shaders/lighting` |
 //! | [`environment`](mod@environment) | light from everywhere, blurred by roughness | `shaders/environment` |
+//! | [`probes`] | light captured nearby, looked up on the walls of rooms | `shaders/lib/probes.wesl` |
 //! | [`forward`](mod@forward) | surfaces lit as they are drawn, glass over them | `shaders/forward` |
 //! | [`ssr`](mod@ssr) | screen-space reflection | `shaders/ssr` |
 //! | [`exposure`](mod@exposure) | average luminance and adaptation | `shaders/exposure` |
@@ -53,6 +54,7 @@ pub mod frame;
 pub mod geometry;
 pub mod knob;
 pub mod lighting;
+pub mod probes;
 pub mod quality;
 pub mod registry;
 mod scene;
@@ -64,7 +66,7 @@ pub use chain::{Chain, ChainSettings, chain};
 pub use error::{EffectError, SettingError};
 pub use quality::Quality;
 pub use registry::{EffectEntry, MapEntry, effect, effects, map_effects};
-pub use scene::{CameraParams, DepthRange, SceneInputs};
+pub use scene::{Beyond, CameraParams, DepthRange, SceneInputs};
 
 /// A library of the kernels of all effects, to plan graphs with and to add one's own
 /// to.

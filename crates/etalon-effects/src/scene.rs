@@ -1,10 +1,11 @@
 //! What a scene hands to the effects.
 
 use etalon_core::graph::{ComputePass, Texture};
-use glam::Vec2;
+use glam::{DMat4, Vec2};
 
 use crate::SettingError;
 use crate::check::Settings;
+use crate::environment::Surroundings;
 
 /// How distances from the view plane become device depth.
 ///
@@ -153,4 +154,17 @@ pub struct SceneInputs {
     pub camera: CameraParams,
     /// Seconds since the frame before, in `[0, 1e6]`.
     pub delta_time: f32,
+    /// What is beyond the screen, if reflections are to show it: light that `colour`
+    /// does not hold, see [`Mirrored`](crate::environment::Mirrored).
+    pub beyond: Option<Beyond>,
+}
+
+/// What reflections show where the screen has no answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beyond {
+    /// Light of probes, and of the world for the rest.
+    pub surroundings: Surroundings,
+    /// From the world to view space: a rotation and a translation, as a
+    /// [`View`](crate::geometry::View) has it.
+    pub view: DMat4,
 }

@@ -22,6 +22,7 @@ impl Frame {
             velocity: Some(graph.import_texture("velocity", self.velocity.desc)?),
             camera: self.camera_params(),
             delta_time,
+            beyond: None,
         })
     }
 

@@ -10,6 +10,7 @@
 //! * [`cases`](mod@cases): inputs that are known to be hard, with their reasons.
 //! * [`demand`](mod@demand): what scenes call for, told before they are drawn.
 //! * [`exr_frame`]: OpenEXR files as frames, and back.
+//! * [`environment_file`]: pictures of all directions from OpenEXR and Radiance files.
 //! * [`picture`]: images as PNG files to look at.
 //!
 //! ```
@@ -33,6 +34,7 @@
 pub mod camera;
 pub mod cases;
 pub mod demand;
+pub mod environment_file;
 pub mod exr_frame;
 pub mod frame;
 mod import;

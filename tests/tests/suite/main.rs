@@ -15,6 +15,7 @@ mod inputs;
 mod lighting;
 mod operations;
 mod position;
+mod probes;
 mod programs;
 mod shading;
 mod tiles;

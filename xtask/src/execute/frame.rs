@@ -4,7 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use etalon::backend::Inputs;
-use etalon::effects::{EffectEntry, EffectError};
+use etalon::effects::environment::{Mirrored, Surroundings};
+use etalon::effects::{Beyond, EffectEntry, EffectError, SceneInputs};
 use etalon::graph::{Graph, GraphError};
 use etalon_scenes::exr_frame::{ExrError, ExrOptions, load_exr};
 use etalon_scenes::frame::FrameError;
@@ -227,11 +228,22 @@ impl Content {
         let inputs = match self {
             Self::Frame(frame) => frame.import(&mut graph, DELTA_TIME)?,
             Self::Shot(shot, size) => {
-                let sky = Shot::sky(&mut graph)?;
-                let drawn = shot.draw(&mut graph, *size, sky, DELTA_TIME)?;
+                // What surfaces mirror of the rooms is seen in reflections, where the
+                // screen has no answer.
+                let around = Surroundings {
+                    mirrored: Mirrored::Reflected,
+                    ..shot.among_rooms(&mut graph)?
+                };
+                let drawn = shot.draw(&mut graph, *size, around, DELTA_TIME)?;
                 // Or nobody would need it.
                 graph.output("deferred", drawn.deferred)?;
-                drawn.inputs
+                SceneInputs {
+                    beyond: Some(Beyond {
+                        surroundings: around,
+                        view: shot.camera().pose().view_matrix(),
+                    }),
+                    ..drawn.inputs
+                }
             }
         };
         let result = effect.build(&mut graph, &inputs)?;

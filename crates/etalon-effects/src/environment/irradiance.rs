@@ -3,9 +3,11 @@
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use etalon_core::image::{ImageData, ImageError};
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
+use super::cube::{CubePicture, FACES, face_direction};
 use super::map::{direction, texel};
+use super::truth::Light;
 use crate::SettingError;
 use crate::check::Settings;
 
@@ -61,6 +63,25 @@ const fn band(number: usize) -> usize {
     }
 }
 
+/// Integrals of radiance times each polynomial.
+#[derive(Default)]
+struct Sum([DVec3; 9]);
+
+impl Sum {
+    /// Light from a unit direction, times the solid angle it comes from.
+    fn add(&mut self, at: DVec3, light: DVec3) {
+        for (sum, value) in self.0.iter_mut().zip(polynomials(at)) {
+            *sum += light * value;
+        }
+    }
+
+    fn irradiance(self) -> Irradiance {
+        Irradiance {
+            harmonics: std::array::from_fn(|k| self.0[k] * CONSTANTS[k]),
+        }
+    }
+}
+
 impl Irradiance {
     /// Of radiance that goes from `below` to `above` with the sine of the elevation.
     #[must_use]
@@ -81,23 +102,53 @@ impl Irradiance {
     pub fn of_equirectangular(image: &ImageData) -> Result<Self, ImageError> {
         let [width, height] = [image.desc.extent.width, image.desc.extent.height];
         let texels = image.to_rgba_f32()?;
-        let mut harmonics = [DVec3::ZERO; 9];
+        let mut sum = Sum::default();
         for y in 0..height {
             let edge = |row: u32| (PI * f64::from(row) / f64::from(height)).cos();
             let solid_angle = TAU / f64::from(width) * (edge(y) - edge(y + 1));
             for x in 0..width {
                 let place = (f64::from(x) + 0.5, f64::from(y) + 0.5);
                 let at = direction(place.0 / f64::from(width), place.1 / f64::from(height));
-                let light = texel(&texels, [width, height], x, y) * solid_angle;
-                for (sum, value) in harmonics.iter_mut().zip(polynomials(at)) {
-                    *sum += light * value;
-                }
+                sum.add(at, texel(&texels, [width, height], x, y) * solid_angle);
             }
         }
-        for (sum, constant) in harmonics.iter_mut().zip(CONSTANTS) {
-            *sum *= constant;
+        Ok(sum.irradiance())
+    }
+
+    /// Of the faces of a cube: each texel's light comes from its centre, in proportion to
+    /// the solid angle that it covers.
+    ///
+    /// # Errors
+    /// If the image's bytes are not what its description says.
+    pub fn of_cube(picture: &CubePicture) -> Result<Self, ImageError> {
+        let side = picture.side();
+        let texels = picture.image().to_rgba_f32()?;
+        let mut sum = Sum::default();
+        for (face, y) in (0..FACES).flat_map(|face| (0..side).map(move |y| (face, y))) {
+            for x in 0..side {
+                let edge = |at: u32| 2.0 * f64::from(at) / f64::from(side) - 1.0;
+                let [left, right, top, bottom] = [edge(x), edge(x + 1), edge(y), edge(y + 1)];
+                // Of the rectangle from the face's middle to a corner.
+                let area = |x: f64, y: f64| (x * y).atan2((x * x + y * y + 1.0).sqrt());
+                let solid_angle =
+                    area(right, bottom) - area(left, bottom) - area(right, top) + area(left, top);
+                let middle = DVec2::new(0.5 * (left + right), 0.5 * (top + bottom));
+                let at = face_direction(face, middle).normalize();
+                let light = texel(&texels, [side, side * FACES], x, face * side + y);
+                sum.add(at, light * solid_angle);
+            }
         }
-        Ok(Self { harmonics })
+        Ok(sum.irradiance())
+    }
+
+    /// Of the largest level of the image of an [`EnvironmentMap`](super::EnvironmentMap),
+    /// cut into pieces of known solid angle.
+    pub fn of_pieces(light: &Light) -> Self {
+        let mut sum = Sum::default();
+        for (at, light) in light.pieces() {
+            sum.add(at, light);
+        }
+        sum.irradiance()
     }
 
     /// The irradiance on a plane that faces a unit direction, not under 0.
@@ -108,8 +159,10 @@ impl Irradiance {
         (sum * PI).max(DVec3::ZERO)
     }
 
-    /// Factors of the polynomials that add up to irradiance over π.
-    pub(super) fn polynomial(&self) -> [DVec3; 9] {
+    /// Factors of the polynomials that add up to irradiance over π, in the order of the
+    /// harmonics: what `environment/irradiance` computes.
+    #[must_use]
+    pub fn polynomial(&self) -> [DVec3; 9] {
         std::array::from_fn(|k| self.harmonics[k] * (CONSTANTS[k] * KEPT[band(k)] / PI))
     }
 

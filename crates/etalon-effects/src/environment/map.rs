@@ -1,4 +1,4 @@
-//! From an equirectangular picture to an octahedral map.
+//! From a picture of all directions to an octahedral map.
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,16 +8,16 @@ use etalon_core::resource::TextureDesc;
 use etalon_core::texel::Texel;
 use glam::{DVec2, DVec3};
 
-use super::Irradiance;
+use super::{CubePicture, Irradiance};
 use crate::check::Settings;
 use crate::{EffectError, SettingError};
 
 /// A picture of all directions, as effects take it.
 ///
-/// The picture given is equirectangular: its columns go round from behind, by
-/// x = −1 and the middle, which is −z, to x = 1 and back; its rows from straight
-/// above, +y, to straight below. Negative light and NaN in it count as 0, more than
-/// the largest `f16` as that.
+/// The picture given is equirectangular, or six [faces](super::CubePicture) of a cube.
+/// The columns of an equirectangular one go round from behind, by x = −1 and the middle,
+/// which is −z, to x = 1 and back; its rows from straight above, +y, to straight below.
+/// Negative light and NaN in it count as 0, more than the largest `f16` as that.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EnvironmentMap {
     image: ImageData,
@@ -27,7 +27,7 @@ pub struct EnvironmentMap {
 /// Subdivisions of a texel in x and y for each texel of the next larger mip.
 const PARTS: u32 = 4;
 
-pub(super) fn check_side(side: u32) -> Result<(), SettingError> {
+pub(crate) fn check_side(side: u32) -> Result<(), SettingError> {
     let check = Settings("environment");
     check.count("side", side, 32, 2048)?;
     if side.is_power_of_two() {
@@ -42,7 +42,7 @@ pub(super) fn mips(side: u32) -> u32 {
 }
 
 /// Texels of an image with all mips, as `lib/octahedral` has it.
-pub(super) fn image_size(side: u32) -> [u32; 2] {
+pub(crate) fn image_size(side: u32) -> [u32; 2] {
     [side + side / 2, side]
 }
 
@@ -106,10 +106,39 @@ impl EnvironmentMap {
             let level = resampled(side >> mip, PARTS, &sample);
             levels.push(level);
         }
+        Self::of_levels(side, &levels, irradiance)
+    }
+
+    /// As [`EnvironmentMap::of_equirectangular`], of the faces of a cube, each mip the mean
+    /// of the faces themselves: what [`of_faces`](super::of_faces) makes on a device. A side
+    /// of 1½ times theirs keeps all of their detail.
+    ///
+    /// # Errors
+    /// If `side` is out of its range, or an image does not fit into memory.
+    pub fn of_cube(picture: &CubePicture, side: u32) -> Result<Self, EffectError> {
+        check_side(side)?;
+        let texels = picture.image().to_rgba_f32()?;
+        let (face, parts) = (picture.side(), super::cube::parts(picture.side(), side));
+        let irradiance = Irradiance::of_cube(picture)?;
+        let sample = |at: DVec3| super::cube::light(&texels, face, at);
+        let level = |mip: u32| {
+            let parts = (parts << mip).min(super::cube::MOST_PARTS);
+            resampled(side >> mip, parts, &sample)
+        };
+        let levels: Vec<Vec<DVec3>> = (0..mips(side)).map(level).collect();
+        Self::of_levels(side, &levels, irradiance)
+    }
+
+    /// Of all mips, the largest first.
+    fn of_levels(
+        side: u32,
+        levels: &[Vec<DVec3>],
+        irradiance: Irradiance,
+    ) -> Result<Self, EffectError> {
         let [width, height] = image_size(side);
         let desc = TextureDesc::d2(width, height, Format::Rgba16Float);
         let mut image = ImageData::zeroed(desc)?;
-        for (mip, level) in (0..).zip(&levels) {
+        for (mip, level) in (0..).zip(levels) {
             let ([left, top], own) = (corner(side, mip), side >> mip);
             for (at, light) in (0..).zip(level) {
                 let [r, g, b] = light.as_vec3().to_array();

@@ -13,6 +13,8 @@
 //! (B. Karis, "Real Shading in Unreal Engine 4", 2013): exact in uniform light,
 //! else without the stretching of highlights towards grazing angles.
 
+mod around;
+mod cube;
 mod irradiance;
 mod map;
 pub mod truth;
@@ -20,17 +22,19 @@ pub mod truth;
 use std::f64::consts::TAU;
 
 use etalon_core::Format;
-use etalon_core::graph::{Draw, Graph, Texture};
+use etalon_core::graph::{Graph, Texture, TextureView};
 use etalon_core::resource::TextureDesc;
-use glam::{DMat4, Mat4, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
+pub(crate) use around::Around;
+pub use cube::{CubePicture, FACES, face_direction};
 pub use irradiance::Irradiance;
 pub use map::{EnvironmentMap, direction};
+pub(crate) use map::{check_side, image_size};
 
-use crate::bloom::LINEAR;
 use crate::check::Settings;
-use crate::geometry::View;
 use crate::knob::{Tunable, knobs};
+use crate::probes::Probes;
 use crate::{EffectError, SettingError};
 
 /// An environment, ready to light surfaces.
@@ -57,6 +61,23 @@ pub struct Surroundings {
     pub environment: Option<Environment>,
     /// The table of [`mirroring`], to be made once for all that use it.
     pub mirroring: Option<Texture>,
+    /// Light captured nearby, which counts before that of the world.
+    pub probes: Option<Probes>,
+    /// Which pass adds what surfaces mirror of all this.
+    pub mirrored: Mirrored,
+}
+
+/// Which pass adds the light of surroundings that opaque surfaces mirror. Glass, over
+/// which no reflection on the screen is laid, mirrors it in every case.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mirrored {
+    /// The one that lights them.
+    #[default]
+    Lit,
+    /// [`ssr`](fn@crate::ssr::ssr), where the screen has no answer: what is
+    /// [beyond](crate::SceneInputs::beyond) it. It mirrors by the specular map alone, as
+    /// it does what is on the screen.
+    Reflected,
 }
 
 /// How finely a radiance map is blurred.
@@ -113,26 +134,96 @@ pub fn environment(
 ) -> Result<Environment, EffectError> {
     settings.validate()?;
     irradiance.validate()?;
-    let extent = graph.desc(base).extent;
-    map::check_side(extent.height)?;
-    let [width, height] = map::image_size(extent.height);
-    Settings("environment").count("width", extent.width, width, width)?;
+    let [width, height] = size_of_map(graph, base)?;
     let radiance = graph.texture(
         "environment radiance",
         TextureDesc::d2(width, height, Format::Rgba16Float),
     );
-    let turn = TAU / f64::from(settings.samples);
-    let radiance = graph
-        .compute("environment/prefilter")
-        .read("source", base)
-        .write("result", radiance)
-        .set("samples", settings.samples)
-        .set("turn", Vec2::new(turn.cos() as f32, turn.sin() as f32))
-        .per_texel("result")?;
     Ok(Environment {
-        radiance,
+        radiance: prefiltered(graph, base, radiance, settings)?,
         irradiance: *irradiance,
     })
+}
+
+/// The size of the image of an [`EnvironmentMap`], if it is one.
+fn size_of_map(graph: &Graph, base: Texture) -> Result<[u32; 2], SettingError> {
+    let extent = graph.desc(base).extent;
+    check_side(extent.height)?;
+    let [width, height] = image_size(extent.height);
+    Settings("environment").count("width", extent.width, width, width)?;
+    Ok([width, height])
+}
+
+/// [`environment`]'s radiance, in a texture of the image's size or a layer of one.
+pub(crate) fn prefiltered(
+    graph: &mut Graph,
+    base: Texture,
+    target: impl Into<TextureView>,
+    settings: &Prefilter,
+) -> Result<Texture, EffectError> {
+    settings.validate()?;
+    size_of_map(graph, base)?;
+    let turn = TAU / f64::from(settings.samples);
+    Ok(graph
+        .compute("environment/prefilter")
+        .read("source", base)
+        .write("result", target)
+        .set("samples", settings.samples)
+        .set("turn", Vec2::new(turn.cos() as f32, turn.sin() as f32))
+        .per_texel("result")?)
+}
+
+/// The factors of irradiance over π of the image of an [`EnvironmentMap`], in nine texels
+/// of `rgba32float`.
+pub(crate) fn scattered(
+    graph: &mut Graph,
+    base: Texture,
+    target: impl Into<TextureView>,
+) -> Result<Texture, EffectError> {
+    size_of_map(graph, base)?;
+    let written = graph
+        .compute("environment/irradiance")
+        .read("source", base)
+        .write("result", target)
+        .groups([9, 1, 1])?;
+    Ok(written.texture("result")?)
+}
+
+/// Most texels of a side of a cube's face.
+pub const MAX_FACE: u32 = 4096;
+
+/// Makes of six faces what [`environment`] takes as `base`: `rgba16float`, `side` texels
+/// high, a power of two in `[32, 2048]`.
+///
+/// `faces` has six square layers of up to [`MAX_FACE`] texels: +x, −x, +y, −y, +z, −z as
+/// they are seen from within, y up; on +y −z is up, on −y +z. These are the faces of a
+/// cube texture turned left to right. What [`capture`](mod@crate::probes::capture) draws
+/// and [`CubePicture`] holds is laid out so.
+///
+/// Each texel is the mean over the part of the sphere that it covers, of as many places
+/// as meet every texel of faces of up to 3 times `side` texels; of smaller mips 256 × 256
+/// at most. The cost is that of the largest mip for each mip.
+///
+/// # Errors
+/// If `side` is out of its range or `faces` is not such a texture.
+pub fn of_faces(graph: &mut Graph, faces: Texture, side: u32) -> Result<Texture, EffectError> {
+    check_side(side)?;
+    let extent = graph.desc(faces).extent;
+    let check = Settings("environment");
+    check.count("face width", extent.width, 1, MAX_FACE)?;
+    check.count("face height", extent.height, extent.width, extent.width)?;
+    check.count("faces", extent.depth_or_layers, 6, 6)?;
+    let [width, height] = image_size(side);
+    let base = graph.texture(
+        "environment base",
+        TextureDesc::d2(width, height, Format::Rgba16Float),
+    );
+    Ok(graph
+        .compute("environment/faces")
+        .read("faces", faces)
+        .write("result", base)
+        .set("parts", cube::parts(extent.width, side))
+        .per_texel("result")?)
 }
 
 /// Texels of the table's sides.
@@ -158,16 +249,6 @@ pub fn mirroring(graph: &mut Graph) -> Result<Texture, EffectError> {
         .per_texel("result")?)
 }
 
-/// Surroundings with all that kernels read.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Around {
-    irradiance: Irradiance,
-    middle: Vec3,
-    slope: Vec3,
-    radiance: Option<Texture>,
-    mirroring: Texture,
-}
-
 impl Surroundings {
     /// Checks every number against its range.
     ///
@@ -184,6 +265,9 @@ impl Surroundings {
                 check.range(field, value, 0.0, 65504.0)?;
             }
         }
+        if let Some(probes) = &self.probes {
+            probes.validate()?;
+        }
         match &self.environment {
             Some(environment) => environment.irradiance.validate(),
             None => Ok(()),
@@ -193,52 +277,9 @@ impl Surroundings {
     /// Whether light comes from them: only then a table of [`mirroring`] is read.
     #[must_use]
     pub fn shine(&self) -> bool {
-        self.environment.is_some() || self.above != Vec3::ZERO || self.below != Vec3::ZERO
-    }
-
-    /// Makes what is missing.
-    pub(crate) fn ready(&self, graph: &mut Graph) -> Result<Around, EffectError> {
-        let mirroring = match self.mirroring {
-            Some(table) => table,
-            None => mirroring(graph)?,
-        };
-        let gradient = Irradiance::of_gradient(self.above.as_dvec3(), self.below.as_dvec3());
-        Ok(Around {
-            irradiance: match &self.environment {
-                Some(environment) => gradient.plus(&environment.irradiance),
-                None => gradient,
-            },
-            middle: 0.5 * (self.above + self.below),
-            slope: 0.5 * (self.above - self.below),
-            radiance: self.environment.map(|environment| environment.radiance),
-            mirroring,
-        })
-    }
-}
-
-impl Around {
-    /// Sets what `lib/surroundings` asks for.
-    pub(crate) fn set(&self, draw: Draw, view: &View) -> Draw {
-        let factors = self.irradiance.polynomial();
-        let columns = |four: [usize; 4]| {
-            let [x, y, z, w] = four.map(|of| factors[of].as_vec3().extend(0.0));
-            Mat4::from_cols(x, y, z, w)
-        };
-        let to_world = DMat4::from_mat3(glam::DMat3::from_mat4(view.view).transpose());
-        let draw = draw
-            .feature("surrounded", true)
-            .feature("environment", self.radiance.is_some())
-            .read("mirroring", self.mirroring)
-            .sampler("smoothing", LINEAR)
-            .set("to_world", to_world.as_mat4())
-            .set("irradiance_low", columns([0, 1, 2, 3]))
-            .set("irradiance_high", columns([4, 5, 6, 7]))
-            .set("irradiance_last", factors[8].as_vec3())
-            .set("middle", self.middle)
-            .set("slope", self.slope);
-        match self.radiance {
-            Some(map) => draw.read("radiance_map", map),
-            None => draw,
-        }
+        self.environment.is_some()
+            || self.probes.is_some()
+            || self.above != Vec3::ZERO
+            || self.below != Vec3::ZERO
     }
 }

@@ -189,6 +189,17 @@ impl Light {
         Ok(pieces)
     }
 
+    /// Each piece's direction, and its light times its solid angle.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
+        let [x, y, z, red, green, blue, _] = &self.pieces;
+        (0..x.len()).map(|k| {
+            (
+                DVec3::new(x[k], y[k], z[k]),
+                DVec3::new(red[k], green[k], blue[k]),
+            )
+        })
+    }
+
     /// The mean over all directions, and the solid angle of all pieces, which is 4π but
     /// for what their sizes are off.
     #[must_use]

@@ -54,7 +54,7 @@ pub fn lighting(
         let camera = &view.camera;
         let around = surroundings.ready(graph)?;
         first = around
-            .set(first, view)
+            .light(first, view.view)
             .read("depth", surfaces.depth)
             .read("normal", surfaces.normal)
             .read("specular", surfaces.specular)

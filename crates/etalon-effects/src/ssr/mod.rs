@@ -8,7 +8,11 @@
 //!
 //! Only what the screen shows can be reflected: what lies outside of it, behind
 //! something, or faces away is not there to be found. The fades of [`Ssr`] let
-//! reflections end gently there.
+//! reflections end gently there. If the inputs say what is
+//! [beyond](SceneInputs::beyond) the screen, that is seen where the screen has no answer:
+//! of probes first, then of the world, `screen · v + beyond · (1 − v)` by the visibility
+//! v. Where both are equally bright the one ends in the other unseen. The cost is that of
+//! [probes](mod@crate::probes) and 8 texels of the world's map, at each pixel that mirrors.
 //!
 //! # Source
 //! D. Lettier, "3D Game Shaders For Beginners: Screen Space Reflection". It
@@ -18,6 +22,7 @@
 //! refinement keeps a bracket of one miss and one hit.
 
 pub(crate) mod demand;
+mod fallback;
 mod passes;
 mod quarter;
 mod tiled;
@@ -28,6 +33,7 @@ use etalon_core::graph::{Graph, Texture};
 
 pub use passes::{blur, march, mix, resolve};
 
+use self::fallback::Fallback;
 use crate::knob::{Tunable, choices, knobs};
 use crate::tiles::crossover::Cost;
 use crate::tiles::{Area, Tiling};
@@ -216,12 +222,14 @@ impl Ssr {
     }
 }
 
-/// Adds reflections to `inputs.colour`; with a resolution of 0 returns it as it is.
+/// Adds reflections to `inputs.colour`; with a resolution of 0 returns it as it is, also
+/// where something is beyond the screen.
 ///
 /// The result is `rgba16float` of the same size.
 ///
 /// # Errors
-/// If a setting is out of range or the inputs differ in size.
+/// If a setting, or a number of what is beyond the screen, is out of range, or the inputs
+/// differ in size.
 pub fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
@@ -231,17 +239,18 @@ pub fn ssr(
     if settings.resolution == 0.0 {
         return Ok(inputs.colour);
     }
+    let fallback = Fallback::of(inputs)?;
     let limit = settings.quarter_from;
     if limit == 0.0 {
-        return quarter::ssr(graph, inputs, settings, None);
+        return quarter::ssr(graph, inputs, settings, fallback.as_ref(), None);
     }
     let smoother = Some(limit).filter(|limit| *limit <= 1.0);
     let result = match settings.tiles.size() {
-        Some(size) => tiled::ssr(graph, inputs, settings, smoother, size)?,
-        None => full(graph, inputs, settings, smoother)?,
+        Some(size) => tiled::ssr(graph, inputs, settings, fallback.as_ref(), smoother, size)?,
+        None => full(graph, inputs, settings, fallback.as_ref(), smoother)?,
     };
     match smoother {
-        Some(_) => quarter::ssr(graph, inputs, settings, Some(result)),
+        Some(_) => quarter::ssr(graph, inputs, settings, fallback.as_ref(), Some(result)),
         None => Ok(result),
     }
 }
@@ -251,6 +260,7 @@ fn full(
     graph: &mut Graph,
     inputs: &SceneInputs,
     settings: &Ssr,
+    fallback: Option<&Fallback<'_>>,
     smoother: Option<f32>,
 ) -> Result<Texture, EffectError> {
     let reflection = march(graph, inputs.depth, inputs.normal, &inputs.camera, settings)?;
@@ -266,6 +276,7 @@ fn full(
         sharp,
         blurred,
         smoother,
+        fallback,
     };
     let result = layers.result(graph)?;
     layers.mix(graph, settings.blend, result, Area::Picture, "ssr/mix")

@@ -4,6 +4,7 @@ use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
 use etalon_core::resource::TextureDesc;
 
+use super::fallback::Fallback;
 use super::{Blend, HitStorage, Search, Ssr};
 use crate::EffectError;
 use crate::check::{Settings, same_size, size};
@@ -203,6 +204,7 @@ pub fn mix(
         sharp,
         blurred,
         smoother: None,
+        fallback: None,
     };
     let result = layers.result(graph)?;
     layers.mix(graph, blend, result, Area::Picture, "ssr/mix")
@@ -215,16 +217,18 @@ pub(super) fn result_over(graph: &mut Graph, colour: Texture) -> Texture {
 
 /// What [`mix`] puts together.
 #[derive(Clone, Copy)]
-pub(super) struct Layers {
+pub(super) struct Layers<'a> {
     pub(super) colour: Texture,
     pub(super) specular: Texture,
     pub(super) sharp: Texture,
     pub(super) blurred: Option<Texture>,
     /// Surfaces of at least this roughness are left as they are.
     pub(super) smoother: Option<f32>,
+    /// What is seen where the screen has no answer.
+    pub(super) fallback: Option<&'a Fallback<'a>>,
 }
 
-impl Layers {
+impl Layers<'_> {
     /// A texture for the result, if the layers fit onto each other.
     pub(super) fn result(&self, graph: &mut Graph) -> Result<Texture, EffectError> {
         let picture = ("colour", size(graph, self.colour));
@@ -262,6 +266,9 @@ impl Layers {
         }
         if let Some(limit) = self.smoother {
             pass = pass.feature("smoother", true).set("quarter_from", limit);
+        }
+        if let Some(fallback) = self.fallback {
+            pass = fallback.with_surfaces(pass);
         }
         area.run(pass, result)
     }

@@ -7,6 +7,7 @@
 
 use etalon_core::graph::{Graph, Texture};
 
+use super::fallback::Fallback;
 use super::passes::{Rate, blur_on, march_on, resolve_on, result_over};
 use super::{Blend, Ssr, tiled};
 use crate::tiles::{Area, Axis, Marks, TileSize};
@@ -37,6 +38,7 @@ pub(super) fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
     settings: &Ssr,
+    fallback: Option<&Fallback<'_>>,
     beneath: Option<Texture>,
 ) -> Result<Texture, EffectError> {
     let radius = settings.blur_radius.div_ceil(2);
@@ -80,6 +82,9 @@ pub(super) fn ssr(
         .constant("ADD", f64::from(u8::from(settings.blend == Blend::Add)));
     if let Some(blurred) = blurred {
         pass = pass.read("blurred", blurred);
+    }
+    if let Some(fallback) = fallback {
+        pass = fallback.set(pass);
     }
     if beneath.is_some() {
         pass = pass

@@ -7,6 +7,7 @@
 use etalon_core::graph::{Graph, Texture};
 
 use super::Ssr;
+use super::fallback::Fallback;
 use super::passes::{Layers, Rate, blur_on, march_on, resolve_on};
 use crate::tiles::{Area, Axis, Marks, TileSize};
 use crate::{EffectError, SceneInputs};
@@ -25,6 +26,7 @@ pub(super) fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
     settings: &Ssr,
+    fallback: Option<&Fallback<'_>>,
     smoother: Option<f32>,
     tiles: TileSize,
 ) -> Result<Texture, EffectError> {
@@ -54,6 +56,7 @@ pub(super) fn ssr(
         sharp,
         blurred: None,
         smoother,
+        fallback,
     };
     let mut result = layers.result(graph)?;
     if radius > 0 {

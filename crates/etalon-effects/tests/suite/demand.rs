@@ -40,6 +40,7 @@ fn inputs(graph: &mut Graph, width: u32, height: u32) -> SceneInputs {
         velocity: Some(import("velocity", Format::Rg16Float)),
         camera: CameraParams::perspective(1.0, 1.5, 0.1),
         delta_time: 1.0 / 60.0,
+        beyond: None,
     }
 }
 

@@ -16,6 +16,7 @@ mod knobs;
 mod library;
 mod metamorphic;
 mod plans;
+mod probes;
 mod settings;
 mod ssr;
 mod ssr_colour;

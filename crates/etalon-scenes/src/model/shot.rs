@@ -3,13 +3,16 @@
 use etalon_core::backend::Inputs;
 use etalon_core::graph::{Graph, GraphError, Texture};
 use etalon_core::image::ImageError;
-use etalon_effects::environment::{Surroundings, mirroring};
+use etalon_effects::environment::{
+    CubePicture, EnvironmentMap, Prefilter, Surroundings, mirroring,
+};
 use etalon_effects::forward::{Lamps, Lighting, forward, glass, lamp_bytes};
 use etalon_effects::frame::{self, Drawables, Request, Shading};
 use etalon_effects::geometry::{GBuffer, Geometry, Prepass, gbuffer, prepass};
 use etalon_effects::lighting::{LightKind, PunctualLight, lighting};
+use etalon_effects::probes::{Probe, ProbeMaps, Probes, Room, probe_bytes, probe_map};
 use etalon_effects::{EffectError, SceneInputs};
-use glam::{DVec3, Vec3};
+use glam::{DQuat, DVec3, Vec3};
 use thiserror::Error;
 
 use super::drawable::{Drawable, lights, view};
@@ -50,6 +53,13 @@ pub enum ShotError {
     Effect(#[from] EffectError),
 }
 
+/// The names of the list of rooms, and of the map of light in them.
+const ROOMS: &str = "rooms";
+const ROOM_LIGHT: &str = "room light";
+
+/// Texels of that map's height.
+const ROOM_SIDE: u32 = 32;
+
 /// A model at a time, before a camera.
 #[derive(Clone, Debug)]
 pub struct Shot {
@@ -60,6 +70,9 @@ pub struct Shot {
     lights: Vec<PunctualLight>,
     /// The lights as the camera sees them.
     lamps: Vec<u8>,
+    /// Rooms around it, and around its middle, as the camera sees them.
+    rooms: Vec<u8>,
+    room_light: EnvironmentMap,
 }
 
 /// The passes that draw a [`Shot`], and what they hand to the effects.
@@ -104,8 +117,14 @@ impl Shot {
         }
         // Where lights are in view space is the same for every size.
         let square = FrameSize::new(1, 1)?;
-        let lamps = lamp_bytes(&view(&camera, square)?, &lights).map_err(EffectError::from)?;
+        let seen = view(&camera, square)?;
+        let lamps = lamp_bytes(&seen, &lights).map_err(EffectError::from)?;
+        let rooms = rooms(&model, &snapshot);
+        let rooms = probe_bytes(&seen, &rooms).map_err(EffectError::from)?;
+        let light = CubePicture::of_directions(ROOM_SIDE, lamp_light)?;
         Ok(Self {
+            rooms,
+            room_light: EnvironmentMap::of_cube(&light, ROOM_SIDE)?,
             model,
             snapshot,
             camera,
@@ -142,7 +161,10 @@ impl Shot {
     /// What a graph with the shot's passes is given.
     #[must_use]
     pub fn inputs(&self) -> Inputs<'_> {
-        self.drawable.inputs().buffer(LAMPS, &self.lamps)
+        let inputs = self.drawable.inputs().buffer(LAMPS, &self.lamps);
+        inputs
+            .buffer(ROOMS, &self.rooms)
+            .texture(ROOM_LIGHT, self.room_light.image())
     }
 
     /// A grey sky, with its table of what is mirrored.
@@ -154,8 +176,23 @@ impl Shot {
             above: Vec3::new(0.5, 0.6, 0.8),
             below: Vec3::splat(0.15),
             background: Vec3::new(0.05, 0.06, 0.08),
-            environment: None,
             mirroring: Some(mirroring(graph)?),
+            ..Surroundings::default()
+        })
+    }
+
+    /// The [sky](Shot::sky), with two rooms of one light in it: one around the model, and
+    /// one within that.
+    ///
+    /// # Errors
+    /// If the graph refuses a pass.
+    pub fn among_rooms(&self, graph: &mut Graph) -> Result<Surroundings, ShotError> {
+        let base = graph.import_texture(ROOM_LIGHT, self.room_light.image().desc)?;
+        let maps = ProbeMaps::new(graph, ROOM_SIDE, 1)?;
+        let maps = probe_map(graph, maps, 0, base, &Prefilter { samples: 16 })?;
+        Ok(Surroundings {
+            probes: Probes::import(graph, ROOMS, maps, 2)?,
+            ..Self::sky(graph)?
         })
     }
 
@@ -212,6 +249,7 @@ impl Shot {
                 velocity: prepass.velocity,
                 camera: view.camera,
                 delta_time,
+                beyond: None,
             },
         })
     }
@@ -253,8 +291,36 @@ impl Shot {
     }
 }
 
-/// A camera before all of a model.
-fn before(model: &Model, snapshot: &Snapshot) -> Result<Camera, CameraError> {
+/// Light of one soft lamp in a dim room.
+fn lamp_light(at: DVec3) -> DVec3 {
+    let lamp = at.dot(DVec3::new(0.6, 0.64, 0.48)).max(0.0).powi(16);
+    DVec3::new(0.2, 0.22, 0.25) * (1.2 + at.y) + DVec3::new(4.0, 3.0, 2.0) * lamp
+}
+
+/// A room around a model, and before it one of half its size.
+fn rooms(model: &Model, snapshot: &Snapshot) -> [Probe; 2] {
+    let (low, high) = bounds(model, snapshot);
+    let least = DVec3::splat(1e-2);
+    let half = (0.525 * (high - low)).clamp(least, DVec3::splat(1e6));
+    [0.5, 1.0].map(|size| {
+        let half = (half * size).max(least);
+        let centre = 0.5 * (low + high);
+        Probe {
+            position: centre + half * DVec3::new(0.2, 0.5, -0.1),
+            room: Room {
+                centre,
+                turn: DQuat::IDENTITY,
+                half,
+            },
+            influence: half,
+            falloff: (0.5 * half.min_element()) as f32,
+            layer: 0,
+        }
+    })
+}
+
+/// The least and the largest corner of all of a model; the origin for nothing.
+fn bounds(model: &Model, snapshot: &Snapshot) -> (DVec3, DVec3) {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for instance in snapshot.instances.all() {
         let bounds = model.parts().meshes[instance.mesh].bounds();
@@ -265,6 +331,16 @@ fn before(model: &Model, snapshot: &Snapshot) -> Result<Camera, CameraError> {
             (low, high) = (low.min(placed), high.max(placed));
         }
     }
+    if low.is_finite() && high.is_finite() {
+        (low, high)
+    } else {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
+}
+
+/// A camera before all of a model.
+fn before(model: &Model, snapshot: &Snapshot) -> Result<Camera, CameraError> {
+    let (low, high) = bounds(model, snapshot);
     let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low).length());
     let eye = centre + DVec3::new(0.5, 0.3, 1.0).normalize() * 2.2 * radius;
     let pose = Pose::look_at(eye, centre, DVec3::Y)?;

@@ -1,6 +1,7 @@
 //! Scenes, files of images and models, and the ray caster.
 
 mod common;
+mod environment_files;
 mod exr;
 mod frames;
 mod geometry;

@@ -111,8 +111,14 @@ impl LightMap {
     /// Declares the passes that make an environment of it.
     pub(super) fn import(&self, graph: &mut Graph) -> Result<Environment, EffectError> {
         let base: Texture = graph.import_texture(BASE, self.base.desc)?;
-        let samples = self.samples;
-        environment(graph, base, &self.irradiance, &Prefilter { samples })
+        environment(graph, base, &self.irradiance, &self.prefilter())
+    }
+
+    /// How it is blurred.
+    pub(super) const fn prefilter(&self) -> Prefilter {
+        Prefilter {
+            samples: self.samples,
+        }
     }
 
     pub(super) fn inputs(&self) -> Inputs<'_> {

@@ -11,6 +11,7 @@ mod forward;
 mod geometry;
 mod light_map;
 mod lighting;
+mod probes;
 mod solids;
 mod surfaces;
 
@@ -25,7 +26,7 @@ use etalon_effects::environment::Surroundings;
 
 pub use self::light_map::LightMap;
 pub use self::solids::{Solid, Solids};
-pub use self::surfaces::Surfaces;
+pub use self::surfaces::{Rooms, Surfaces};
 use super::CaseError;
 use crate::frame::FrameSize;
 
@@ -68,13 +69,14 @@ impl DrawnEffect {
         Self::ALL.into_iter().find(|effect| effect.name() == name)
     }
 
-    const fn cases(self) -> &'static [DrawnCase] {
-        match self {
-            Self::Geometry => geometry::CASES,
-            Self::Lighting => lighting::CASES,
-            Self::Environment => environment::CASES,
-            Self::Forward => forward::CASES,
-        }
+    fn cases(self) -> impl Iterator<Item = &'static DrawnCase> {
+        let (own, probes): (&[DrawnCase], &[DrawnCase]) = match self {
+            Self::Geometry => (geometry::CASES, &[]),
+            Self::Lighting => (lighting::CASES, probes::CASES),
+            Self::Environment => (environment::CASES, &[]),
+            Self::Forward => (forward::CASES, &[]),
+        };
+        own.iter().chain(probes)
     }
 }
 
@@ -213,7 +215,7 @@ const MIRRORING: &str = "mirroring";
 pub fn drawn_cases() -> impl Iterator<Item = (DrawnEffect, &'static DrawnCase)> {
     DrawnEffect::ALL
         .into_iter()
-        .flat_map(|effect| effect.cases().iter().map(move |case| (effect, case)))
+        .flat_map(|effect| effect.cases().map(move |case| (effect, case)))
 }
 
 #[cfg(test)]
@@ -234,7 +236,7 @@ mod tests {
             assert!(!case.source.is_empty(), "{}", case.name);
         }
         for effect in DrawnEffect::ALL {
-            assert!(effect.cases().len() >= 12, "{effect}");
+            assert!(effect.cases().count() >= 12, "{effect}");
             assert_eq!(DrawnEffect::named(effect.name()), Some(effect));
         }
     }

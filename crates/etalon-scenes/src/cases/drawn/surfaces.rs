@@ -8,6 +8,7 @@ use etalon_core::image::ImageData;
 use etalon_effects::EffectError;
 use etalon_effects::geometry::{GBuffer, View};
 use etalon_effects::lighting::{PunctualLight, Surroundings, lighting};
+use etalon_effects::probes::{Probe, ProbeMaps, Probes, probe_bytes, probe_map};
 use glam::{DMat4, DVec3, Vec3};
 
 use super::super::Step;
@@ -31,7 +32,23 @@ pub struct Surfaces {
     pub environment: Option<LightMap>,
     /// See [`Stage::give_mirroring`].
     pub(super) mirroring: Option<Arc<ImageData>>,
+    /// Light captured nearby, if there is any.
+    pub rooms: Option<Rooms>,
 }
+
+/// Probes of one map.
+#[derive(Clone, Debug)]
+pub struct Rooms {
+    /// Where they count.
+    pub probes: Vec<Probe>,
+    /// What all of them have captured.
+    pub map: LightMap,
+    list: Vec<u8>,
+}
+
+/// The names of the probes' list and map among the graph's imports.
+const LIST: &str = "probes";
+const CAPTURED: &str = "captured";
 
 impl Surfaces {
     /// On a canvas, each texel a function of its place, without light.
@@ -55,6 +72,7 @@ impl Surfaces {
             surroundings: Surroundings::default(),
             environment: None,
             mirroring: None,
+            rooms: None,
         })
     }
 
@@ -88,6 +106,18 @@ impl Surfaces {
         }
     }
 
+    /// With probes around, of the map of one of them.
+    pub(super) fn around(self, probes: &[Probe], map: LightMap) -> Self {
+        Self {
+            rooms: Some(Rooms {
+                probes: probes.to_vec(),
+                map,
+                list: Vec::new(),
+            }),
+            ..self
+        }
+    }
+
     /// The same with everything, the eye and the lights, moved in the world.
     pub(super) fn moved(mut self, by: DVec3) -> Self {
         self.view.view = DMat4::from_translation(-by);
@@ -95,11 +125,18 @@ impl Surfaces {
         for light in &mut self.lights {
             light.position += by;
         }
+        for probe in self.rooms.iter_mut().flat_map(|rooms| &mut rooms.probes) {
+            probe.position += by;
+            probe.room.centre += by;
+        }
         self
     }
 
     /// As a stage.
-    pub(super) fn staged(self) -> Result<Stage, CaseError> {
+    pub(super) fn staged(mut self) -> Result<Stage, CaseError> {
+        if let Some(rooms) = &mut self.rooms {
+            rooms.list = probe_bytes(&self.view, &rooms.probes).map_err(EffectError::from)?;
+        }
         Ok(Stage::Surfaces(Box::new(self)))
     }
 
@@ -121,6 +158,12 @@ impl Surfaces {
         });
         let inputs = match &self.mirroring {
             Some(table) => inputs.texture(MIRRORING, table),
+            None => inputs,
+        };
+        let inputs = match &self.rooms {
+            Some(rooms) => inputs
+                .buffer(LIST, &rooms.list)
+                .texture(CAPTURED, &rooms.map.base),
             None => inputs,
         };
         match &self.environment {
@@ -146,6 +189,9 @@ impl Surfaces {
         if let Some(map) = &self.environment {
             surroundings.environment = Some(map.import(&mut graph)?);
         }
+        if let Some(rooms) = &self.rooms {
+            surroundings.probes = rooms.import(&mut graph)?;
+        }
         let surroundings = with_mirroring(&mut graph, surroundings, self.mirroring.as_ref())?;
         let light = lighting(
             &mut graph,
@@ -156,5 +202,15 @@ impl Surfaces {
         )?;
         graph.output("light", light)?;
         Ok(graph)
+    }
+}
+
+impl Rooms {
+    /// Declares the passes that make a probe's map.
+    fn import(&self, graph: &mut Graph) -> Result<Option<Probes>, EffectError> {
+        let base = graph.import_texture(CAPTURED, self.map.base.desc)?;
+        let maps = ProbeMaps::new(graph, self.map.base.desc.extent.height, 1)?;
+        let maps = probe_map(graph, maps, 0, base, &self.map.prefilter())?;
+        Probes::import(graph, LIST, maps, self.probes.len() as u32)
     }
 }

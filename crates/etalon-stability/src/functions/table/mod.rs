@@ -2,6 +2,7 @@
 
 mod images;
 mod numbers;
+mod rooms;
 
 /// What a function is given beside numbers.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -64,7 +65,7 @@ pub(in crate::functions) fn any(_: [f32; 4]) -> bool {
 
 /// All of them.
 pub(in crate::functions) fn functions() -> impl Iterator<Item = &'static Function> {
-    [numbers::FUNCTIONS, images::FUNCTIONS]
+    [numbers::FUNCTIONS, images::FUNCTIONS, rooms::FUNCTIONS]
         .into_iter()
         .flatten()
 }

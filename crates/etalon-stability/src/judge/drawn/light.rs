@@ -32,7 +32,7 @@ pub(super) fn wrong<'a>(surfaces: &Surfaces, stores: &'a [Store]) -> Option<Vec<
     if around.above.max_element() > 0.0 || around.below.max_element() > 0.0 {
         return None;
     }
-    if surfaces.environment.is_some() {
+    if surfaces.environment.is_some() || surfaces.rooms.is_some() {
         return None;
     }
     let (store, stored) = of(stores, "lighting/light map")?;

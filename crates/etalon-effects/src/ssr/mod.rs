@@ -45,9 +45,9 @@ pub enum Search {
     /// The same, and then bisection between the last miss and the hit.
     #[default]
     Refined,
-    /// As linear, but that all of the ray's way between two looks is held against what
-    /// is seen, and the hit is where it begins to be within the thickness. Misses what the
-    /// ray touches beside the texels looked at.
+    /// As linear, but that the ray's whole way through each texel looked at is held
+    /// against its surface, and the hit is where it begins to be within the thickness.
+    /// Misses what the ray touches beside those texels.
     Dda,
     /// Every texel that the ray touches, but for whole squares of them that a
     /// [pyramid](crate::hiz) says it cannot meet anything in. Finds the first crossing

@@ -261,7 +261,7 @@ fn no_first_crossing_is_missed() {
 #[test]
 fn looks_at_single_texels_find_most_of_them() {
     // What the ray touches beside the texels looked at is missed, and what is behind it
-    // found instead: on blocks of random distances that is the rule at their corners.
+    // found instead or nothing: on blocks of random distances at their corners.
     let [mut dda, mut refined] = [Agreement::default(); 2];
     for seed in 0..100 {
         let screen = Screen::random(1000 + seed);
@@ -272,45 +272,49 @@ fn looks_at_single_texels_find_most_of_them() {
         }
     }
     println!("dda: {dda:?}\nrefined: {refined:?}");
-    assert!(dda.true_hits > 50_000);
-    // All of the way through a texel is held against it, not one place on it.
-    assert!(dda.differ() < refined.differ(), "{dda:?} {refined:?}");
-    assert!(dda.missed * 20 < dda.true_hits, "{dda:?}");
+    assert!(dda.true_hits > 40_000);
+    // What there is not is never found.
+    assert_eq!(dda.added, 0);
+    // The ray's whole way through a texel is held against it, not one place on it.
+    assert!(dda.missed < refined.missed, "{dda:?} {refined:?}");
+    assert!(dda.differ() * 5 < dda.true_hits, "{dda:?}");
 }
 
 #[test]
 fn a_wall_is_hit_where_the_closed_form_says() {
-    // Mirrors 4 away, in the first 20 columns. Rays right along x meet a wall that is
-    // nearer by less than the thickness where its first column begins; rays that also go
-    // away from the eye cross the front of one that is farther.
+    // A column of mirrors 4 away, nothing, and a wall from column 20 on. Rays right along
+    // x meet one that is nearer by less than the thickness where it begins; rays that also
+    // go away from the eye cross the front of one that is farther.
     let camera = CameraParams::perspective(1.2, 1.0, 0.1);
     let side = 64_u32;
     let eye = |x: u32, y: u32| {
         let ndc = |texel: u32| 2.0 * (texel as f32 + 0.5) / side as f32 - 1.0;
         Vec3::new(ndc(x) / camera.scale.x, -ndc(y) / camera.scale.y, -1.0)
     };
-    for (out, wall) in [(Vec3::X, 3.9), (Vec3::new(1.0, 0.0, -0.5), 4.5)] {
+    let column = 5;
+    for (out, wall) in [(Vec3::X, 3.9), (Vec3::new(1.0, 0.0, -0.5), 5.0)] {
         let screen = Screen::of([side, side], camera, |x, y| {
-            let distance = if x < 20 { 4.0 } else { wall };
-            (Some(distance), out.normalize() - eye(x, y).normalize())
+            let distance = match x {
+                5 => Some(4.0),
+                20.. => Some(wall),
+                _ => None,
+            };
+            (distance, out.normalize() - eye(x, y).normalize())
         });
+        let expected = if out.z < 0.0 {
+            let start = 4.0 * eye(column, 32);
+            let at = start.x + out.x * (wall - 4.0) / -out.z;
+            let u = 0.5 + 0.5 * camera.scale.x * at / wall;
+            assert!(u * side as f32 > 21.0, "beyond where the wall begins");
+            u
+        } else {
+            20.0 / side as f32
+        };
         for search in [Search::Dda, Search::HiZ] {
             let found = screen.marched(&searching(search));
-            for x in 0..20 {
-                let start = 4.0 * eye(x, 32);
-                let border = 20.0 / side as f32;
-                let crossed = if out.z < 0.0 {
-                    // At the wall's distance.
-                    let at = start.x + out.x * (wall - 4.0) / -out.z;
-                    0.5 + 0.5 * camera.scale.x * at / wall
-                } else {
-                    border
-                };
-                let expected = crossed.max(border);
-                let texel = found[(32 * side + x) as usize];
-                let error = (texel[0] - expected).abs() * side as f32;
-                assert!(error < 1e-3, "{search:?}, {out}, {x}: {texel:?} {expected}");
-            }
+            let texel = found[(32 * side + column) as usize];
+            let error = (texel[0] - expected).abs() * side as f32;
+            assert!(error < 1e-3, "{search:?}, {out}: {texel:?} {expected}");
         }
     }
 }

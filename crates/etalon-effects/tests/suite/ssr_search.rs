@@ -173,6 +173,8 @@ struct Agreement {
     added: usize,
     missed: usize,
     elsewhere: usize,
+    /// Found nearer along the ray than the first there is.
+    before: usize,
 }
 
 impl Agreement {
@@ -188,6 +190,8 @@ impl Agreement {
                     let place = DVec2::new(texel[0].into(), texel[1].into());
                     let apart = ((place - hit.uv) * extent).length();
                     self.elsewhere += usize::from(apart > 0.01);
+                    // By more than what f32 makes of a length of these scenes.
+                    self.before += usize::from(f64::from(texel[3]) < hit.length * 0.999 - 1e-3);
                 }
                 (None, false) => {}
             }
@@ -274,10 +278,9 @@ fn looks_at_single_texels_find_most_of_them() {
     println!("dda: {dda:?}\nrefined: {refined:?}");
     assert!(dda.true_hits > 40_000);
     // What there is not is never found.
-    assert_eq!(dda.added, 0);
+    assert_eq!((dda.added, dda.before), (0, 0), "{dda:?}");
     // The ray's whole way through a texel is held against it, not one place on it.
     assert!(dda.missed < refined.missed, "{dda:?} {refined:?}");
-    assert!(dda.differ() * 5 < dda.true_hits, "{dda:?}");
 }
 
 #[test]

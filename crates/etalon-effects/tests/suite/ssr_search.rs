@@ -70,7 +70,7 @@ impl Screen {
         let block = 1 + hash(seed ^ 6) % 9;
         let slope = 0.2 * (share(seed ^ 7) - 0.5);
         Self::of(size, camera, |x, y| {
-            let own = hash(seed ^ hash(x / block ^ hash(y / block)));
+            let own = hash(seed ^ hash((x / block) ^ hash(y / block)));
             let texel = hash(seed ^ hash(x ^ hash(!y)));
             let distance = 0.5 + 8.0 * share(own) + slope * (x + y) as f32 * share(own ^ 1);
             let turn = std::f32::consts::TAU * share(texel ^ 3);

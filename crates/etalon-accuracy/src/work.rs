@@ -9,6 +9,9 @@ use etalon_cpu::{CpuBackend, CpuOptions, Profile};
 
 use crate::model::Work;
 
+/// The kernel that follows rays.
+const MARCH: &str = "ssr/march";
+
 /// Whether an operation of the interpreter fetches a texel, or four for a gather
 /// and eight at most for a sample, which count as one each: a sampler is one unit.
 fn fetches(operation: &str) -> bool {
@@ -42,26 +45,33 @@ pub fn count(plan: &Plan, inputs: &Inputs<'_>) -> Result<Work, BackendError> {
                 work.texel_fetches += times;
             }
         }
-        if profile.kernel == "ssr/march" {
+        if profile.kernel == MARCH {
             work.steps_per_ray = steps_per_ray(profile);
         }
     }
     Ok(work)
 }
 
-/// Texels looked at along a ray, in the mean over the pixels that show a surface.
+/// Texels looked at along a ray, those of a pyramid as well, in the mean over the pixels
+/// that show a surface.
 ///
-/// A march reads its own pixel once, before it begins: of the lines that fetch,
-/// the one that fetches most is the one in the march, and the one that fetches
-/// least is read once by every pixel that shows a surface.
+/// The march itself reads its own pixel once, before it begins, and its searches, which
+/// are other files, look at the others: of the march's own lines that fetch, the one that
+/// fetches least is read once by every pixel that shows a surface.
 fn steps_per_ray(profile: &Profile) -> Option<f64> {
-    let mut lines: BTreeMap<u32, u64> = BTreeMap::new();
+    let mut own: BTreeMap<u32, u64> = BTreeMap::new();
+    let mut looks = 0;
     for instruction in &profile.instructions {
-        if fetches(&instruction.operation) {
-            *lines.entry(instruction.location.line).or_default() += instruction.cost.active_lanes;
+        let (location, lanes) = (&instruction.location, instruction.cost.active_lanes);
+        if !fetches(&instruction.operation) {
+            continue;
+        }
+        if location.file.contains(MARCH) {
+            *own.entry(location.line).or_default() += lanes;
+        } else {
+            looks += lanes;
         }
     }
-    let least = lines.values().copied().min().filter(|count| *count > 0)?;
-    let most = lines.values().copied().max()?;
-    (lines.len() > 1).then(|| most as f64 / least as f64)
+    let rays = own.values().copied().min().filter(|count| *count > 0)?;
+    Some(looks as f64 / rays as f64)
 }

@@ -22,7 +22,8 @@
 //! of them by name.
 //!
 //! [`tiles`] lets heavy kernels run only where the picture needs them
-//! (`shaders/tiles`).
+//! (`shaders/tiles`), [`hiz`] has pyramids of distances for those that search the screen
+//! (`shaders/hiz`).
 //!
 //! # Settings
 //! Settings are plain structs. Each field says what it does to the picture, its
@@ -52,6 +53,7 @@ pub mod exposure;
 pub mod forward;
 pub mod frame;
 pub mod geometry;
+pub mod hiz;
 pub mod knob;
 pub mod lighting;
 pub mod probes;

@@ -2,9 +2,9 @@
 
 use etalon_core::graph::Graph;
 use etalon_effects::knob::KnobValue;
-use etalon_effects::{EffectError, effects};
+use etalon_effects::{EffectError, effect, effects};
 use etalon_scenes::cases::drawn::{DrawnCase, DrawnEffect, drawn_cases};
-use etalon_scenes::cases::{Case, CaseError, Expected, Recovery, case, cases};
+use etalon_scenes::cases::{Case, CaseError, Expected, Family, Recovery, case, cases};
 use thiserror::Error;
 
 use crate::knobs;
@@ -82,6 +82,33 @@ impl Subject {
         }
     }
 
+    /// The same frames for each search of reflections that the effect does not do by
+    /// default: what is hard for one way along a ray is hard for all. Light and tone
+    /// change nothing of what is found.
+    fn otherwise_searched(family: Family, case: &'static Case) -> Vec<Self> {
+        const KNOB: &str = "search";
+        let found_alike = matches!(family, Family::Light | Family::Tone | Family::Time);
+        let Some(ssr) = effect("ssr").filter(|ssr| case.concerns(ssr.name)) else {
+            return Vec::new();
+        };
+        if found_alike || case.knobs.iter().any(|(name, _)| *name == KNOB) {
+            return Vec::new();
+        }
+        let knobs = ssr.knobs();
+        let knob = knobs.iter().find(|knob| knob.name == KNOB);
+        let others = knob.into_iter().flat_map(|knob| {
+            let others = knob.ladder.iter();
+            others.filter(|value| **value != knob.default)
+        });
+        let searched = others.map(|&value| Self {
+            name: format!("{}-by-{value}", case.name),
+            effects: vec![Effect::OfImages(*ssr)],
+            knobs: [case.knobs, &[(KNOB, value)]].concat(),
+            ..Self::of_images(family.name(), case)
+        });
+        searched.collect()
+    }
+
     fn of_stage(effect: DrawnEffect, case: &'static DrawnCase) -> Self {
         Self {
             name: case.name.to_owned(),
@@ -144,6 +171,9 @@ pub fn subjects() -> Result<Vec<Subject>, SubjectError> {
     let mut found: Vec<Subject> = cases()
         .map(|(family, case)| Subject::of_images(family.name(), case))
         .collect();
+    for (family, case) in cases() {
+        found.extend(Subject::otherwise_searched(family, case));
+    }
     found.extend(drawn_cases().map(|(effect, case)| Subject::of_stage(effect, case)));
     let frames = case(knobs::FRAMES).ok_or(SubjectError::Missing(knobs::FRAMES))?;
     found.extend(knobs::subjects(frames));

@@ -11,6 +11,7 @@ mod forward;
 mod fuzz;
 mod geometry;
 mod half;
+mod hiz;
 mod inputs;
 mod lighting;
 mod operations;

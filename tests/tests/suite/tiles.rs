@@ -2,7 +2,7 @@
 
 use etalon::Format;
 use etalon::backend::Backend;
-use etalon::effects::ssr::{Ssr, ssr};
+use etalon::effects::ssr::{Search, Ssr, ssr};
 use etalon::effects::tiles::Tiling;
 use etalon::graph::Graph;
 use etalon::image::ImageData;
@@ -120,6 +120,7 @@ fn tiles_change_no_bit_on_any_backend() {
                     resolution: 0.25,
                     blur_radius: [6, 9, 0][number % 3],
                     quarter_from: [2.0, 0.5, 0.0][number / 3 % 3],
+                    search: [Search::Refined, Search::HiZ, Search::Dda][(number + number / 3) % 3],
                     ..Ssr::default()
                 };
                 let mut on = |kernels: &KernelLibrary, tiles| {

@@ -15,11 +15,13 @@
 //! [probes](mod@crate::probes) and 8 texels of the world's map, at each pixel that mirrors.
 //!
 //! # Source
-//! D. Lettier, "3D Game Shaders For Beginners: Screen Space Reflection". It
-//! differs from that text where that fails: rays are cut at the near plane
-//! before they are projected, 1/distance is interpolated instead of its
-//! reciprocal, an axis the ray does not cross is never divided by, and
-//! refinement keeps a bracket of one miss and one hit.
+//! D. Lettier, "3D Game Shaders For Beginners: Screen Space Reflection", for the march
+//! and the mix; M. McGuire and M. Mara, "Efficient GPU Screen-Space Ray Tracing", JCGT
+//! 3(4), 2014, for [`Search::Dda`]; Y. Uludag, "Hi-Z Screen-Space Cone-Traced
+//! Reflections", GPU Pro 5, 2014, for [`Search::HiZ`]. It differs from the first where that
+//! fails: rays are cut at the near plane before they are projected, 1/distance is
+//! interpolated instead of its reciprocal, an axis the ray does not cross is never divided
+//! by, and refinement keeps a bracket of one miss and one hit.
 
 pub(crate) mod demand;
 mod fallback;
@@ -31,6 +33,7 @@ pub mod truth;
 use etalon_core::Format;
 use etalon_core::graph::{Graph, Texture};
 
+use passes::{Marched, Rate};
 pub use passes::{blur, march, mix, resolve};
 
 use self::fallback::Fallback;
@@ -48,11 +51,23 @@ pub enum Search {
     /// The same, and then bisection between the last miss and the hit.
     #[default]
     Refined,
+    /// As linear, but that the ray's whole way through each texel looked at is held
+    /// against its surface, and the hit is where it begins to be within the thickness.
+    /// Misses what the ray touches beside those texels.
+    Dda,
+    /// Every texel that the ray touches, but for whole squares of them that a
+    /// [pyramid](crate::hiz) says it cannot meet anything in. Finds the first crossing
+    /// there is, at a cost that hardly grows with the length of the ray; `resolution` does
+    /// not enter. The pyramid costs a look at each texel, and 8/3 bytes for each, wherever
+    /// anything mirrors.
+    HiZ,
 }
 
 choices!(Search {
     Linear => "linear",
     Refined => "refined",
+    Dda => "dda",
+    HiZ => "hi-z",
 });
 
 /// What the place and length of a reflection are stored in between the passes.
@@ -103,7 +118,8 @@ pub struct Ssr {
     pub max_distance: f32,
     /// Share of the texels along the ray that are looked at, in `[0, 1]`. 1 is
     /// every one; ½ every second, at half the cost, missing what is thinner
-    /// than two texels. 0 turns the effect off.
+    /// than two texels. 0 turns the effect off. Of [`Search::HiZ`] it says no more than
+    /// that.
     pub resolution: f32,
     /// How the screen is searched.
     pub search: Search,
@@ -115,8 +131,8 @@ pub struct Ssr {
     /// in `[1e-6, 1e6]`. Too large smears the outlines of things along the
     /// ray, too small tears holes into what is seen at a slope. Costs nothing.
     pub thickness: f32,
-    /// Most texels looked at along one ray, in `[1, 23171]`: an upper bound on
-    /// the cost. Rays that would need more reflect nothing.
+    /// Most texels looked at along one ray, of the picture or of a pyramid, in
+    /// `[1, 23171]`: an upper bound on the cost. Rays that would need more reflect nothing.
     pub march_limit: u32,
     /// Fade of rays that turn back toward the eye, which meet the backs of
     /// things: 0 for none, 1 until nothing is left straight back. In `[0, 1]`.
@@ -157,7 +173,7 @@ pub struct Ssr {
 knobs!(Ssr, "ssr" {
     real max_distance [1e-3, 1e6] "view units", Look [5.0, 20.0, 100.0], "longest ray";
     real resolution [0.0, 1.0] "", Accuracy [0.0625, 0.125, 0.25, 0.5, 1.0], "share of the texels along a ray that are looked at";
-    choice search [Search] "", Accuracy ["linear", "refined"], "how the screen is searched";
+    choice search [Search] "", Accuracy ["linear", "dda", "refined", "hi-z"], "how the screen is searched";
     count steps [0, 24] "", Accuracy [1, 2, 3, 5, 8, 12], "halvings of the step that found the hit";
     real thickness [1e-6, 1e6] "view units", Look [0.05, 0.25, 1.0], "how far behind a surface counts as inside of it";
     count march_limit [1, 23_171] "", Accuracy [32, 128, 512, 4096], "most texels looked at along one ray";
@@ -239,18 +255,20 @@ pub fn ssr(
     if settings.resolution == 0.0 {
         return Ok(inputs.colour);
     }
+    let marched = Marched::new(graph, inputs, settings)?;
     let fallback = Fallback::of(inputs)?;
+    let fallback = fallback.as_ref();
     let limit = settings.quarter_from;
     if limit == 0.0 {
-        return quarter::ssr(graph, inputs, settings, fallback.as_ref(), None);
+        return quarter::ssr(graph, inputs, &marched, settings, fallback, None);
     }
     let smoother = Some(limit).filter(|limit| *limit <= 1.0);
     let result = match settings.tiles.size() {
-        Some(size) => tiled::ssr(graph, inputs, settings, fallback.as_ref(), smoother, size)?,
-        None => full(graph, inputs, settings, fallback.as_ref(), smoother)?,
+        Some(size) => tiled::ssr(graph, inputs, &marched, settings, fallback, smoother, size)?,
+        None => full(graph, inputs, &marched, settings, fallback, smoother)?,
     };
     match smoother {
-        Some(_) => quarter::ssr(graph, inputs, settings, fallback.as_ref(), Some(result)),
+        Some(_) => quarter::ssr(graph, inputs, &marched, settings, fallback, Some(result)),
         None => Ok(result),
     }
 }
@@ -259,11 +277,12 @@ pub fn ssr(
 fn full(
     graph: &mut Graph,
     inputs: &SceneInputs,
+    marched: &Marched,
     settings: &Ssr,
     fallback: Option<&Fallback<'_>>,
     smoother: Option<f32>,
 ) -> Result<Texture, EffectError> {
-    let reflection = march(graph, inputs.depth, inputs.normal, &inputs.camera, settings)?;
+    let reflection = marched.at(graph, settings, Rate::Full, Area::Picture)?;
     let sharp = resolve(graph, reflection, inputs.colour)?;
     let blurred = if settings.blur_radius > 0 {
         Some(blur(graph, sharp, settings.blur_radius)?)

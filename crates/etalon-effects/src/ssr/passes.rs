@@ -6,10 +6,11 @@ use etalon_core::resource::TextureDesc;
 
 use super::fallback::Fallback;
 use super::{Blend, HitStorage, Search, Ssr};
-use crate::EffectError;
 use crate::check::{Settings, same_size, size};
+use crate::hiz::{Build, Pyramid, pyramid};
 use crate::scene::CameraParams;
 use crate::tiles::{Area, Axis};
+use crate::{EffectError, SceneInputs};
 
 /// Which pixels are marched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,65 +52,108 @@ pub fn march(
     camera: &CameraParams,
     settings: &Ssr,
 ) -> Result<Texture, EffectError> {
-    march_on(
-        graph,
-        depth,
-        normal,
-        camera,
-        settings,
-        Rate::Full,
-        Area::Picture,
-    )
+    let marched = Marched::of(graph, depth, normal, *camera, settings)?;
+    marched.at(graph, settings, Rate::Full, Area::Picture)
 }
 
-/// [`march`] where it is asked for.
-pub(super) fn march_on(
-    graph: &mut Graph,
+/// How the screen is searched, and over what.
+#[derive(Clone, Copy)]
+enum Over {
+    /// Steps, with so many halvings of the last.
+    Steps(u32),
+    Texels,
+    Squares(Pyramid),
+}
+
+/// What is marched, at whatever rates and in whatever places.
+pub(super) struct Marched {
     depth: Texture,
     normal: Texture,
-    camera: &CameraParams,
-    settings: &Ssr,
-    rate: Rate,
-    area: Area,
-) -> Result<Texture, EffectError> {
-    settings.validate()?;
-    camera.validate()?;
-    // Steps as far apart as the largest picture is wide are no steps.
-    Settings("ssr").range("resolution", settings.resolution, 1.0 / 16_384.0, 1.0)?;
-    same_size(
-        "ssr",
-        ("depth", size(graph, depth)),
-        ("normal", size(graph, normal)),
-    )?;
-    let [width, height] = match rate {
-        Rate::Full => size(graph, depth),
-        Rate::Quarter => size(graph, depth).map(|side| side.div_ceil(2)),
-    };
-    let desc = TextureDesc::d2(width, height, settings.storage.format());
-    let result = graph.texture("ssr.reflection", desc);
-    let pass = graph
-        .compute("ssr/march")
-        .named(rate.named("ssr/march"))
-        .feature("quarter", rate == Rate::Quarter)
-        .read("depth", depth)
-        .read("normal", normal)
-        .feature("half", settings.storage == HitStorage::Half);
-    let refinements = match settings.search {
-        Search::Linear => 0,
-        Search::Refined => settings.steps,
-    };
-    let pass = camera
-        .set(pass)
-        .set("max_distance", settings.max_distance)
-        .set("thickness", settings.thickness)
-        .set("stride", 1.0 / settings.resolution)
-        .set("max_steps", settings.march_limit)
-        .set("refinements", refinements)
-        .set("camera_fade", settings.camera_fade)
-        .set("depth_fade", settings.depth_fade)
-        .set("distance_fade", settings.distance_fade)
-        .set("border", settings.border);
-    area.run(pass, result)
+    camera: CameraParams,
+    over: Over,
+}
+
+impl Marched {
+    pub(super) fn new(
+        graph: &mut Graph,
+        inputs: &SceneInputs,
+        settings: &Ssr,
+    ) -> Result<Self, EffectError> {
+        Self::of(graph, inputs.depth, inputs.normal, inputs.camera, settings)
+    }
+
+    fn of(
+        graph: &mut Graph,
+        depth: Texture,
+        normal: Texture,
+        camera: CameraParams,
+        settings: &Ssr,
+    ) -> Result<Self, EffectError> {
+        settings.validate()?;
+        camera.validate()?;
+        // Steps as far apart as the largest picture is wide are no steps.
+        Settings("ssr").range("resolution", settings.resolution, 1.0 / 16_384.0, 1.0)?;
+        same_size(
+            "ssr",
+            ("depth", size(graph, depth)),
+            ("normal", size(graph, normal)),
+        )?;
+        let over = match settings.search {
+            Search::Linear => Over::Steps(0),
+            Search::Refined => Over::Steps(settings.steps),
+            Search::Dda => Over::Texels,
+            Search::HiZ => Over::Squares(pyramid(graph, depth, &camera, Build::default())?),
+        };
+        Ok(Self {
+            depth,
+            normal,
+            camera,
+            over,
+        })
+    }
+
+    /// [`march`] where it is asked for.
+    pub(super) fn at(
+        &self,
+        graph: &mut Graph,
+        settings: &Ssr,
+        rate: Rate,
+        area: Area,
+    ) -> Result<Texture, EffectError> {
+        let [width, height] = match rate {
+            Rate::Full => size(graph, self.depth),
+            Rate::Quarter => size(graph, self.depth).map(|side| side.div_ceil(2)),
+        };
+        let desc = TextureDesc::d2(width, height, settings.storage.format());
+        let result = graph.texture("ssr.reflection", desc);
+        let pass = graph
+            .compute("ssr/march")
+            .named(rate.named("ssr/march"))
+            .feature("quarter", rate == Rate::Quarter)
+            .read("depth", self.depth)
+            .read("normal", self.normal)
+            .feature("half", settings.storage == HitStorage::Half);
+        let pass = self
+            .camera
+            .set(pass)
+            .set("max_distance", settings.max_distance)
+            .set("thickness", settings.thickness)
+            .set("max_steps", settings.march_limit)
+            .set("camera_fade", settings.camera_fade)
+            .set("depth_fade", settings.depth_fade)
+            .set("distance_fade", settings.distance_fade)
+            .set("border", settings.border);
+        let stride = 1.0 / settings.resolution;
+        let pass = match self.over {
+            Over::Steps(refinements) => pass.set("stride", stride).set("refinements", refinements),
+            Over::Texels => pass.feature("dda", true).set("stride", stride),
+            Over::Squares(pyramid) => pass
+                .feature("hiz", true)
+                .read("pyramid", pyramid.texture)
+                .set("levels", pyramid.layout.levels()),
+        };
+        area.run(pass, result)
+    }
 }
 
 /// Looks up `colour` where [`march`] says the reflection is.

@@ -8,7 +8,7 @@
 use etalon_core::graph::{Graph, Texture};
 
 use super::fallback::Fallback;
-use super::passes::{Rate, blur_on, march_on, resolve_on, result_over};
+use super::passes::{Marched, Rate, blur_on, resolve_on, result_over};
 use super::{Blend, Ssr, tiled};
 use crate::tiles::{Area, Axis, Marks, TileSize};
 use crate::{EffectError, SceneInputs};
@@ -37,6 +37,7 @@ struct Areas {
 pub(super) fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
+    marched: &Marched,
     settings: &Ssr,
     fallback: Option<&Fallback<'_>>,
     beneath: Option<Texture>,
@@ -54,15 +55,7 @@ pub(super) fn ssr(
             others: None,
         },
     };
-    let reflection = march_on(
-        graph,
-        inputs.depth,
-        inputs.normal,
-        &inputs.camera,
-        settings,
-        Rate::Quarter,
-        areas.found,
-    )?;
+    let reflection = marched.at(graph, settings, Rate::Quarter, areas.found)?;
     let sharp = resolve_on(graph, reflection, inputs.colour, Rate::Quarter, areas.found)?;
     let blurred = match areas.blurred {
         Some(areas) => Some(blur_on(graph, sharp, radius, Rate::Quarter, areas)?),

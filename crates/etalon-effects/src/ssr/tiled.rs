@@ -8,7 +8,7 @@ use etalon_core::graph::{Graph, Texture};
 
 use super::Ssr;
 use super::fallback::Fallback;
-use super::passes::{Layers, Rate, blur_on, march_on, resolve_on};
+use super::passes::{Layers, Marched, Rate, blur_on, resolve_on};
 use crate::tiles::{Area, Axis, Marks, TileSize};
 use crate::{EffectError, SceneInputs};
 
@@ -25,6 +25,7 @@ const REFLECTED: u32 = 8;
 pub(super) fn ssr(
     graph: &mut Graph,
     inputs: &SceneInputs,
+    marched: &Marched,
     settings: &Ssr,
     fallback: Option<&Fallback<'_>>,
     smoother: Option<f32>,
@@ -39,15 +40,7 @@ pub(super) fn ssr(
     }
 
     let found = Area::Tiles(marks.with(graph, SMOOTH | REFLECTED)?);
-    let reflection = march_on(
-        graph,
-        inputs.depth,
-        inputs.normal,
-        &inputs.camera,
-        settings,
-        Rate::Full,
-        found,
-    )?;
+    let reflection = marched.at(graph, settings, Rate::Full, found)?;
     let sharp = resolve_on(graph, reflection, inputs.colour, Rate::Full, found)?;
 
     let layers = Layers {

@@ -9,7 +9,7 @@ use etalon_core::resource::TextureDesc;
 use etalon_effects::bloom::Bloom;
 use etalon_effects::composite::{Composite, Output, ToneCurve};
 use etalon_effects::exposure::{Exposure, Metering};
-use etalon_effects::ssr::{Blend, Ssr};
+use etalon_effects::ssr::{Blend, Search, Ssr, ssr};
 use etalon_effects::{CameraParams, ChainSettings, EffectError, SceneInputs, chain, effects};
 
 /// Inputs of a scene of `width × height` texels.
@@ -152,6 +152,45 @@ fn a_resolution_of_zero_is_off() {
     };
     let result = chain(&mut graph, &inputs, &settings).expect("valid settings");
     assert_eq!(result.light, inputs.colour);
+}
+
+#[test]
+fn a_pyramid_is_there_once_if_a_search_goes_over_it_and_not_otherwise() {
+    let kernels = etalon_effects::kernels();
+    let planned = |search, quarter_from| {
+        let mut graph = Graph::new();
+        let inputs = inputs(&mut graph, 640, 360);
+        let settings = Ssr {
+            search,
+            quarter_from,
+            ..Ssr::default()
+        };
+        let result = ssr(&mut graph, &inputs, &settings).expect("valid settings");
+        graph.output("picture", result).expect("written");
+        plan(&graph, &kernels, Arithmetic::Strict)
+    };
+    // One rate, both, the slower alone.
+    for quarter_from in [Ssr::NO_QUARTER, 0.5, 0.0] {
+        let plain = planned(Search::Refined, quarter_from);
+        for search in [Search::Linear, Search::Refined, Search::Dda] {
+            let plan = planned(search, quarter_from);
+            let paths = kernels_of(&plan);
+            assert!(
+                paths.iter().all(|path| !path.starts_with("hiz/")),
+                "{paths:?}"
+            );
+            let heaps = [plan.texture_heap, plan.buffer_heap];
+            assert_eq!(heaps, [plain.texture_heap, plain.buffer_heap], "{search:?}");
+        }
+        let plan = planned(Search::HiZ, quarter_from);
+        let made = kernels_of(&plan)
+            .iter()
+            .filter(|path| path.starts_with("hiz/"))
+            .count();
+        // Levels of 320×180 to 1×1.
+        assert_eq!(made, 10);
+        assert_eq!(plan.steps.len(), plain.steps.len() + made);
+    }
 }
 
 #[test]

@@ -333,6 +333,95 @@ pub(super) const CASES: &[Case] = &[
         },
     ),
     Case::new(
+        "ray-behind-a-long-wall",
+        "far behind a near wall, and then into a small step: squares of the nearest depth alone never say that \
+         there is nothing to be met, squares of the farthest do",
+        "Y. Uludag, Hi-Z Screen-Space Cone-Traced Reflections, GPU Pro 5, 2014 (rays behind objects)",
+        || {
+            Canvas::small().paint(|spot| match spot.x {
+                0..8 => spot.mirror(4.0, DVec3::X),
+                8..43 => spot.wall(2.0),
+                _ => spot.wall(3.9).coloured([9.0, 8.0, 2.0]),
+            })
+        },
+    )
+    .on(&["ssr"]),
+    Case::new(
+        "ray-to-an-odd-last-column",
+        "what there is to be met is in the last of 129 columns and 67 rows: squares that are halved and rounded \
+         down, of 2 × 2 parents each, do not have it",
+        "bevyengine/bevy#22603 and godotengine/godot#73420 (pyramids of odd sizes)",
+        || {
+            Canvas::new((129, 67)).paint(|spot| {
+                if spot.x == 128 || spot.y == 66 {
+                    spot.wall(3.9).coloured([9.0, 8.0, 2.0])
+                } else if (spot.x / 8 + spot.y / 8) % 2 == 0 {
+                    spot.mirror(4.0, DVec3::X)
+                } else {
+                    spot.mirror(4.0, DVec3::NEG_Y)
+                }
+            })
+        },
+    )
+    .on(&["ssr"]),
+    Case::new(
+        "ray-through-corners-of-squares",
+        "rays along a diagonal of texels leave every square of a pyramid at its corner, over both borders at \
+         once: a step into either neighbour is in a square that the ray does not pass",
+        "M. McGuire and M. Mara, JCGT 3(4), 2014; Y. Uludag, GPU Pro 5, 2014 (crossing cells)",
+        || {
+            let side = 64;
+            Canvas::new((side, side))
+                .camera(|camera| camera.scale = Vec2::ONE)
+                .paint(|spot| {
+                    // A wall on one side of the main diagonal, at every corner.
+                    let beside = spot.x == spot.y + 1 || spot.y == spot.x + 1;
+                    if beside && spot.x > 20 || spot.x > 60 {
+                        spot.wall(3.9)
+                    } else {
+                        spot.mirror(4.0, DVec3::new(1.0, -1.0, 0.0))
+                    }
+                })
+        },
+    )
+    .on(&["ssr"]),
+    Case::new(
+        "ray-over-a-gap-to-a-single-texel",
+        "nothing at all over whole squares, and in the last one a single texel: what nothing stands for must \
+         neither be met nor hide that",
+        "godotengine/godot#73420 (reflections of the cleared depth)",
+        || {
+            Canvas::small().paint(|spot| {
+                if spot.x < 8 {
+                    spot.mirror(4.0, DVec3::X)
+                } else if spot.x == 45 {
+                    spot.wall(3.9).coloured([9.0, 8.0, 2.0])
+                } else {
+                    spot.sky()
+                }
+            })
+        },
+    )
+    .on(&["ssr"]),
+    Case::new(
+        "ray-into-a-hole-of-one-texel",
+        "behind all that a square shows but for one texel, where the ray is just behind what is seen through \
+         the hole: a square's nearest and farthest surfaces lie on both sides of the ray",
+        "OloEngine#284 (nearest and farthest depth of a pyramid)",
+        || {
+            Canvas::small().paint(|spot| {
+                if spot.x < 8 {
+                    spot.mirror(4.0, DVec3::X)
+                } else if spot.x == 29 {
+                    spot.wall(3.9).coloured([9.0, 8.0, 2.0])
+                } else {
+                    spot.wall(1.5)
+                }
+            })
+        },
+    )
+    .on(&["ssr"]),
+    Case::new(
         "ray-in-a-concave-corner",
         "the hit is the next texel: the bracket is one texel wide from the start",
         "M. McGuire and M. Mara, JCGT 3(4), 2014",

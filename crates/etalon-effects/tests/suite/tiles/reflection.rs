@@ -5,7 +5,7 @@ use etalon_core::image::ImageData;
 use etalon_core::kernel::{Arithmetic, KernelLibrary};
 use etalon_core::plan::{Capture, Groups, Step};
 use etalon_cpu::{Checks, CpuBackend, CpuOptions, FindingKind};
-use etalon_effects::ssr::{Blend, HitStorage, Ssr, ssr};
+use etalon_effects::ssr::{Blend, HitStorage, Search, Ssr, ssr};
 use etalon_effects::tiles::Tiling;
 use etalon_effects::tiles::crossover::Cost;
 use etalon_scenes::{Frame, FrameSize, scene};
@@ -17,6 +17,9 @@ pub(super) type Mask = Box<dyn Fn(u32, u32) -> [f32; 4]>;
 
 pub(super) const ROUGH: [f32; 4] = [0.6, 0.8, 1.0, 0.25];
 pub(super) const SMOOTH: [f32; 4] = [1.0, 0.7, 0.2, 1.0];
+
+pub(super) const SEARCHES: [Search; 4] =
+    [Search::Linear, Search::Refined, Search::Dda, Search::HiZ];
 
 /// A frame whose every surface could mirror, with a specular map of our own.
 pub(super) fn frame(name: &str, width: u32, height: u32, mask: &Mask) -> Frame {
@@ -195,6 +198,7 @@ fn random_masks_of_every_density_on_every_size() {
                 let mut settings = settings([0, 6, 13, 64][seed as usize % 4]);
                 settings.storage = [HitStorage::Full, HitStorage::Half][seed as usize / 4 % 2];
                 settings.blend = [Blend::Add, Blend::Replace][seed as usize / 8 % 2];
+                settings.search = SEARCHES[seed as usize / 16 % SEARCHES.len()];
                 let what = format!("{width}×{height}, one in {one_in}, {settings:?}");
                 bench.hold(&frame, &settings, &what);
             }

@@ -62,15 +62,12 @@ const PRESETS: &[(&str, [Values; 4])] = &[
                 ("resolution", KnobValue::Real(0.125)),
                 ("steps", KnobValue::Count(8)),
             ],
+            &[("resolution", KnobValue::Real(0.25))],
             &[
                 ("resolution", KnobValue::Real(0.25)),
                 ("steps", KnobValue::Count(12)),
             ],
-            &[
-                ("resolution", KnobValue::Real(0.5)),
-                ("steps", KnobValue::Count(12)),
-            ],
-            &[("steps", KnobValue::Count(8))],
+            &[("search", KnobValue::Choice("hi-z"))],
         ],
     ),
     (

@@ -24,7 +24,7 @@ struct Arguments {
     /// Effects; all without it.
     #[arg(long, value_delimiter = ',')]
     effect: Vec<String>,
-    /// Parts of the names of cases; all without it.
+    /// Names of cases, or parts of names; all without it.
     #[arg(long, value_delimiter = ',')]
     case: Vec<String>,
     /// Executors; devices are compared with `cpu`, `cpu-f64` with `cpu-shadow`.

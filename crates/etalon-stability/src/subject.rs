@@ -104,6 +104,7 @@ impl Subject {
             name: format!("{}-by-{value}", case.name),
             effects: vec![Effect::OfImages(*ssr)],
             knobs: [case.knobs, &[(KNOB, value)]].concat(),
+            expected: case.searched,
             ..Self::of_images(family.name(), case)
         });
         searched.collect()

@@ -5,7 +5,7 @@ use etalon_effects::DepthRange;
 use glam::{DVec3, Vec2};
 
 use super::paint::{Canvas, FRAME_TIME, SMALL, Spot, Texel};
-use super::{Case, CaseError, Step};
+use super::{Case, CaseError, Expected, Step};
 use crate::camera::{Camera, Pose};
 use crate::frame::FrameSize;
 use crate::scenes::{World, WorldError};
@@ -232,7 +232,12 @@ pub(super) const CASES: &[Case] = &[
                 }
             })
         },
-    ),
+    )
+    .expecting_of_searches(&[Expected {
+        effect: "ssr",
+        bound: 1.0,
+        reason: "where a ray goes along a surface within an ulp, it meets it anywhere in the texel",
+    }]),
     Case::new(
         "depth-stored-in-half-floats",
         "steps of 0.5 m at 1 km: a smooth floor becomes a staircase that mirrors its own steps",

@@ -155,6 +155,9 @@ pub struct Case {
     pub knobs: &'static [(&'static str, KnobValue)],
     /// Larger rounding errors, with their reasons.
     pub expected: &'static [Expected],
+    /// The same where reflections are searched by another way than the default one; what
+    /// is expected of that, unless something is said here.
+    pub searched: &'static [Expected],
     /// For sequences with a fault in them.
     pub recovery: Option<Recovery>,
     build: fn() -> Result<Vec<Step>, CaseError>,
@@ -174,6 +177,7 @@ impl Case {
             effects: &[],
             knobs: &[],
             expected: &[],
+            searched: &[],
             recovery: None,
             build,
         }
@@ -191,7 +195,16 @@ impl Case {
 
     /// With larger errors.
     const fn expecting(self, expected: &'static [Expected]) -> Self {
-        Self { expected, ..self }
+        Self {
+            expected,
+            searched: expected,
+            ..self
+        }
+    }
+
+    /// With larger errors where reflections are searched by texels.
+    const fn expecting_of_searches(self, searched: &'static [Expected]) -> Self {
+        Self { searched, ..self }
     }
 
     /// With a fault in a frame.
@@ -336,7 +349,7 @@ mod tests {
                 case.name
             );
             assert!(!case.source.is_empty(), "{}", case.name);
-            for expected in case.expected {
+            for expected in case.expected.iter().chain(case.searched) {
                 assert!(expected.bound > 0.0 && expected.reason.len() > 20);
             }
         }

@@ -28,7 +28,7 @@ pub const FOLLOWED: usize = 2048;
 /// What is run.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Parts of the names of cases; all without one.
+    /// Names of cases, or parts of names; all without one.
     pub cases: Vec<String>,
     /// Names of effects, or `lib` for the functions of kernels by themselves; all without
     /// one.
@@ -230,12 +230,24 @@ fn choose(options: &Options) -> Result<Vec<(Subject, Vec<Effect>)>, RunError> {
             return Err(RunError::NoCase { name: part.clone() });
         }
     }
-    let wanted = |subject: &Subject| {
-        options.cases.is_empty() || options.cases.iter().any(|part| subject.name.contains(part))
+    let named = |part: &String, subject: &Subject| {
+        // A whole name is that case alone, and not those whose names begin with it.
+        if all.iter().any(|subject| subject.name == *part) {
+            subject.name == *part
+        } else {
+            subject.name.contains(part)
+        }
     };
+    let wanted: Vec<bool> = all
+        .iter()
+        .map(|subject| {
+            options.cases.is_empty() || options.cases.iter().any(|part| named(part, subject))
+        })
+        .collect();
     Ok(all
         .into_iter()
-        .filter(wanted)
+        .zip(wanted)
+        .filter_map(|(subject, wanted)| wanted.then_some(subject))
         .map(|subject| {
             let effects = subject
                 .effects

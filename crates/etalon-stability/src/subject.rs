@@ -83,8 +83,8 @@ impl Subject {
     }
 
     /// The same frames for each search of reflections that the effect does not do by
-    /// default: what is hard for one way along a ray is hard for all. Light and tone
-    /// change nothing of what is found.
+    /// default: what is hard for one way along a ray is hard for all. The linear one is
+    /// the default's first part; light and tone change nothing of what is found.
     fn otherwise_searched(family: Family, case: &'static Case) -> Vec<Self> {
         const KNOB: &str = "search";
         let found_alike = matches!(family, Family::Light | Family::Tone | Family::Time);
@@ -98,7 +98,8 @@ impl Subject {
         let knob = knobs.iter().find(|knob| knob.name == KNOB);
         let others = knob.into_iter().flat_map(|knob| {
             let others = knob.ladder.iter();
-            others.filter(|value| **value != knob.default)
+            let linear = KnobValue::Choice("linear");
+            others.filter(move |value| **value != knob.default && **value != linear)
         });
         let searched = others.map(|&value| Self {
             name: format!("{}-by-{value}", case.name),

@@ -26,7 +26,7 @@ fn exp2_f64(x: f64) -> f64 {
     sum = sum * r + 9.618_129_159_402_558e-3;
     sum = sum * r + 5.550_410_866_476_042_4e-2;
     sum = sum * r + 2.402_265_069_581_299e-1;
-    sum = sum * r + 6.931_471_805_599_453e-1;
+    sum = sum * r + LN_2;
     sum = sum * r + 1.0;
     let power = f64::from_bits(shifted.to_bits().wrapping_add(1023) << 52);
     sum * power

@@ -109,21 +109,16 @@ impl RasterProgram {
         }
         resources.push(Resource::Buffer(&immediates));
 
-        let mut counters = DrawCounters::default();
         let region = region(draw);
         let assembly = self.assemble(draw)?;
-        if !region.is_empty() && assembly.triangles() > 0 && draw.range.instances > 0 {
-            let shape = (region, width);
-            self.draw_instances(
-                executor,
-                draw,
-                &resources,
-                shape,
-                &assembly,
-                watch,
-                &mut counters,
-            )?;
-        }
+        let is_empty = region.is_empty() || assembly.triangles() == 0 || draw.range.instances == 0;
+        let counters = match is_empty {
+            true => DrawCounters::default(),
+            false => {
+                let shape = (region, width);
+                self.draw_instances(executor, draw, &resources, shape, &assembly, watch)?
+            }
+        };
         note_written(&self.bindings, draw.resources);
         for view in draw.colours.iter().chain(draw.depth) {
             view.note_written();
@@ -294,8 +289,8 @@ impl RasterProgram {
         (region, width): (Region, u32),
         assembly: &Assembly,
         watch: &DrawWatch,
-        counters: &mut DrawCounters,
-    ) -> Result<(), RasterError> {
+    ) -> Result<DrawCounters, RasterError> {
+        let mut counters = DrawCounters::default();
         let map = ViewportMap::new(&draw.viewport);
         let targets: Vec<Target<'_>> = self.targets(draw);
         let feeds = self.feeds_of_fragments();
@@ -356,7 +351,7 @@ impl RasterProgram {
             }
             first = last;
         }
-        Ok(())
+        Ok(counters)
     }
 
     /// When depth is tested: before shading unless the fragment kernel has a say in

@@ -88,7 +88,7 @@ pub struct Captured<'a> {
 }
 
 /// Who looks from a point at each face of a cube, in the order of
-/// [`of_faces`](crate::environment::of_faces).
+/// [`of_faces`].
 #[must_use]
 pub fn views(position: DVec3, near: f32) -> [View; FACES as usize] {
     std::array::from_fn(|face| {
